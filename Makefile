@@ -1,0 +1,55 @@
+# Needs python3 (3.11 or 3.12) with venv, and make; everything else goes into .venv.
+#   make PYTHON=python3.12 ...    uses another Python
+
+PYTHON ?= python3
+VENV = .venv
+BIN = $(VENV)/bin
+INSTALLED = $(VENV)/.installed
+UNFINISHED = $(VENV)/.unfinished
+DEMO = runs/demo
+
+.PHONY: help demo test bench lint clean
+
+help:  ## this list
+	@sed -n 's/^\([a-z]*\):.*## */  make \1	/p' Makefile
+
+demo: $(INSTALLED)  ## the arm moves a screwdriver and a circuit board; recordings in runs/demo
+	$(BIN)/tca-mj demo pick-and-place --object screwdriver --out $(DEMO)/screwdriver
+	$(BIN)/tca-mj demo pick-and-place --object pcb --out $(DEMO)/pcb
+	@for object in screwdriver pcb; do \
+	    echo "$$object:"; \
+	    for file in summary.json rollout.rrd rollout.mp4; do \
+	        path=$(DEMO)/$$object/$$file; \
+	        if [ -e "$$path" ]; then echo "  $$path"; else echo "  $$path (not written)"; fi; \
+	    done; \
+	done
+	@echo "open a recording:  $(BIN)/rerun $(DEMO)/screwdriver/rollout.rrd"
+
+test: $(INSTALLED)  ## all tests
+	MPLBACKEND=Agg $(BIN)/pytest -q
+
+bench: $(INSTALLED)  ## speed and accuracy figures, in runs/bench
+	$(BIN)/python scripts/benchmark.py --out runs/bench
+
+lint: $(INSTALLED)  ## style and types
+	$(BIN)/ruff check .
+	$(BIN)/python scripts/typing_tree.py
+	$(BIN)/mypy
+
+clean:  ## removes .venv and what was built; keeps runs
+	rm -rf $(VENV) build dist *.egg-info .mypy_cache .pytest_cache .ruff_cache
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +
+
+# .unfinished stands in .venv from before its making to after the first complete installation:
+# where it is found, a run was interrupted, and the environment is made anew. So is one whose pip
+# does not start. An environment that somebody else made in .venv is used as it is.
+$(INSTALLED): pyproject.toml constraints.txt
+	@if [ -e $(UNFINISHED) ] || ! $(BIN)/python -m pip --version >/dev/null 2>&1; then \
+	    echo "making $(VENV), which takes some minutes"; \
+	    rm -rf $(VENV) && mkdir $(VENV) && : >$(UNFINISHED) && $(PYTHON) -m venv $(VENV); \
+	fi
+	@rm -f $(INSTALLED)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check \
+	    -c constraints.txt -e '.[demo,rl,dev]'
+	@: >$(INSTALLED)
+	@rm -f $(UNFINISHED)

@@ -1,0 +1,1 @@
+"""Controllers, training and evaluation, imported as ``tca_mj.agents``."""

@@ -1,0 +1,45 @@
+"""The Gymnasium ids of the package.
+
+The tasks live in ``tca_mj.envs``, the last layer but one, and yet ``import tca_mj`` has to make
+their ids known. So this file names them as strings, which Gymnasium resolves in ``gymnasium.make``,
+and imports nothing but Gymnasium itself.
+"""
+
+from dataclasses import dataclass
+
+import gymnasium
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Task:
+    """What Gymnasium has to know of a task before its code is loaded.
+
+    Attributes:
+        id: Gymnasium id, ``TCA/<Name>-v<n>``.
+        entry_point: ``module:class`` of the environment.
+        max_episode_steps: Number of control steps after which ``TimeLimit`` truncates.
+    """
+
+    id: str
+    entry_point: str
+    max_episode_steps: int
+
+
+TASKS = (
+    Task(
+        id="TCA/ArmPickPlace-v0",
+        entry_point="tca_mj.envs.arm:ArmPickPlace",
+        max_episode_steps=400,
+    ),
+)
+
+
+def register() -> None:
+    """Registers every task that Gymnasium does not know yet; further calls change nothing."""
+    for task in TASKS:
+        if task.id not in gymnasium.registry:
+            gymnasium.register(
+                task.id,
+                entry_point=task.entry_point,
+                max_episode_steps=task.max_episode_steps,
+            )
