@@ -1,0 +1,1 @@
+"""From beams and routes to MuJoCo: chains of links, tendons, scenes."""

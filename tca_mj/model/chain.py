@@ -1,0 +1,184 @@
+"""A soft beam as a chain of rigid pieces in MuJoCo.
+
+The beam is cut into n cells of length h = L/n. Each cell bends, twists and stretches at one
+*node* in its middle, so the rigid pieces between the nodes have lengths h/2, h, ..., h, h/2. A
+node is up to four joints of one body, with EI/h, GJ/h and EA/h as stiffness. The order of the
+joints is mirrored from node to node: finite rotations about several axes do not commute, and
+neither do a rotation and a stretch, and the mirror cancels the first-order part of that error.
+
+MuJoCo's own ``<composite type="cable">`` is not used: it cannot stretch, its stiffness cannot be
+changed while the simulation runs, and MuJoCo 4 no longer has it.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from tca_mj.rod.beam import BeamSpec
+
+Motion = Literal["stretch", "bend_x", "bend_y", "twist"]
+MOTIONS: tuple[Motion, ...] = ("stretch", "bend_x", "bend_y", "twist")
+
+# Axis of each motion in the piece's frame, z along the beam.
+_AXIS = {"stretch": (0, 0, 1), "bend_x": (1, 0, 0), "bend_y": (0, 1, 0), "twist": (0, 0, 1)}
+_REFERENCE = {"bend_x": 0, "bend_y": 1, "twist": 2}  # component of the reference curvature
+
+
+@dataclass(frozen=True, slots=True)
+class Chain:
+    """A beam built into a MuJoCo specification.
+
+    Attributes:
+        name: Prefix of all names of the chain.
+        beam: What was built.
+        cell: Length h of a cell [m].
+        motions: Which motions each node has.
+        pieces: The n + 1 rigid pieces from base to tip.
+        points: Positions along the beam, 0 to L, of the pieces' middles: the base, the cells'
+            ends and the tip, shape (n + 1,) [m]. TCAs may be held at these points.
+        joints: Names of the joints, one mapping from motion to name per node.
+    """
+
+    name: str
+    beam: BeamSpec
+    cell: float
+    motions: tuple[Motion, ...]
+    pieces: tuple[mujoco.MjsBody, ...]
+    points: NDArray[np.float64]
+    joints: tuple[dict[Motion, str], ...]
+
+    @property
+    def nodes(self) -> int:
+        """Number n of nodes."""
+        return len(self.joints)
+
+    @property
+    def tip(self) -> mujoco.MjsBody:
+        """The last piece; its frame sits at the last node, the tip is h/2 further along z."""
+        return self.pieces[-1]
+
+    def local(self, piece: int) -> float:
+        """z of the piece's point in the piece's own frame [m]."""
+        return 0.0 if piece == 0 else self.cell / 2.0
+
+
+def beam(
+    parent: mujoco.MjsBody,
+    spec: BeamSpec,
+    *,
+    nodes: int,
+    name: str,
+    motions: Sequence[Motion] = MOTIONS,
+    pos: Sequence[float] = (0.0, 0.0, 0.0),
+    quat: Sequence[float] = (1.0, 0.0, 0.0, 0.0),
+    rgba: Sequence[float] = (0.93, 0.87, 0.78, 1.0),
+    friction: Sequence[float] = (1.0, 0.005, 0.0001),
+    collide: bool = True,
+) -> Chain:
+    """Adds a beam to ``parent``, its base at ``pos`` and its axis along the local z.
+
+    Args:
+        parent: Body that holds the base.
+        spec: The beam.
+        nodes: Number of nodes.
+        name: Prefix of all names.
+        motions: Motions of each node; leave out those the part does not need.
+        pos: Position of the base in the parent's frame [m].
+        quat: Orientation of the base, wxyz.
+        rgba: Colour.
+        friction: Sliding, torsional and rolling friction of the surface.
+        collide: Whether the pieces touch objects and ground. They never touch each other.
+
+    Returns:
+        The chain.
+
+    Raises:
+        ValueError: If there are no nodes, no motions, or an unknown motion.
+    """
+    if nodes < 1:
+        raise ValueError(f"nodes must be at least 1, got {nodes}")
+    unknown = [motion for motion in motions if motion not in MOTIONS]
+    if unknown or not motions:
+        raise ValueError(f"motions must be some of {MOTIONS}, got {tuple(motions)}")
+    kept: tuple[Motion, ...] = tuple(motion for motion in MOTIONS if motion in motions)
+    cell = spec.length / nodes
+    look = _Look(spec, tuple(rgba), tuple(friction), collide)
+
+    piece = parent.add_body(name=f"{name}.piece0", pos=list(pos), quat=list(quat))
+    look.dress(piece, cell / 2.0, f"{name}.skin0")
+    pieces, joints = [piece], []
+    for node in range(nodes):
+        reach = cell / 2.0 if node == 0 else cell
+        piece = piece.add_body(name=f"{name}.piece{node + 1}", pos=[0.0, 0.0, reach])
+        order = kept if node % 2 == 0 else kept[::-1]
+        joints.append({m: _add_joint(piece, spec, cell, m, f"{name}.{m}{node}") for m in order})
+        look.dress(piece, cell if node < nodes - 1 else cell / 2.0, f"{name}.skin{node + 1}")
+        pieces.append(piece)
+    return Chain(
+        name=name,
+        beam=spec,
+        cell=cell,
+        motions=kept,
+        pieces=tuple(pieces),
+        points=np.linspace(0.0, spec.length, nodes + 1),
+        joints=tuple(joints),
+    )
+
+
+def _add_joint(
+    body: mujoco.MjsBody, spec: BeamSpec, cell: float, motion: Motion, name: str
+) -> str:
+    stiffness = {
+        "stretch": spec.stretching,
+        "bend_x": spec.bending[0],
+        "bend_y": spec.bending[1],
+        "twist": spec.torsion,
+    }[motion] / cell
+    hinge = motion != "stretch"
+    body.add_joint(
+        name=name,
+        type=mujoco.mjtJoint.mjJNT_HINGE if hinge else mujoco.mjtJoint.mjJNT_SLIDE,
+        axis=list(_AXIS[motion]),
+        stiffness=[stiffness, 0.0, 0.0],
+        damping=[spec.damping_time * stiffness, 0.0, 0.0],
+        springref=cell * spec.curvature[_REFERENCE[motion]] if hinge else 0.0,
+    )
+    return name
+
+
+@dataclass(frozen=True, slots=True)
+class _Look:
+    """Mass, shape and surface of the pieces."""
+
+    spec: BeamSpec
+    rgba: tuple[float, ...]
+    friction: tuple[float, ...]
+    collide: bool
+
+    def dress(self, body: mujoco.MjsBody, length: float, name: str) -> None:
+        outline = self.spec.outline
+        half = length / 2.0
+        if outline.round:
+            shape, size = mujoco.mjtGeom.mjGEOM_CYLINDER, [outline.half_width, half, 0.0]
+        else:
+            shape = mujoco.mjtGeom.mjGEOM_BOX
+            size = [outline.half_width, outline.half_height, half]
+        # Pieces overlap in the bent beam: bit 0 of contype is for objects and ground only.
+        body.add_geom(
+            name=name,
+            type=shape,
+            size=size,
+            pos=[0.0, 0.0, half],
+            mass=self.spec.line_density * length,
+            rgba=list(self.rgba),
+            friction=list(self.friction),
+            contype=0,
+            conaffinity=1 if self.collide else 0,
+            condim=4,
+            solref=[5e-3, 1.0],
+            solimp=[0.95, 0.99, 5e-4, 0.5, 2.0],
+        )

@@ -1,0 +1,81 @@
+"""A built piece of a robot: a MuJoCo specification and the TCAs that run in it."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import mujoco
+
+from tca_mj.model.tendon import RoutedTca
+
+
+@dataclass(slots=True)
+class Part:
+    """A module, a robot or a whole scene; parts are attached to parts.
+
+    Attributes:
+        spec: The MuJoCo specification. Its frame is the part's base.
+        tcas: The TCAs in it, in the order of a simulation's actuator axis.
+        sites: Names of sites with a meaning, for example ``tip``.
+    """
+
+    spec: mujoco.MjSpec
+    tcas: tuple[RoutedTca, ...] = ()
+    sites: dict[str, str] = field(default_factory=dict)
+
+    def attach(
+        self, child: "Part", *, to: str, prefix: str, names: Sequence[str] | None = None
+    ) -> None:
+        """Attaches ``child`` rigidly to the site ``to`` of this part; the child is used up.
+
+        All names of the child get ``prefix`` and a dot in front.
+
+        Args:
+            child: The part to attach.
+            to: Name of one of this specification's sites.
+            prefix: Name of the child in this part.
+            names: Which of the child's named sites to keep, by default all.
+
+        Raises:
+            ValueError: If there is no such site, or a TCA of that name exists already.
+        """
+        site = self.spec.site(to)
+        if site is None:
+            known = [s.name for s in self.spec.sites if ".leg" not in s.name]
+            raise ValueError(f"to must be a site of this part, one of {known}, got {to!r}")
+        mine = {tca.name for tca in self.tcas}
+        renamed = tuple(
+            replace(
+                tca,
+                name=f"{prefix}.{tca.name}",
+                stiffening=tuple((f"{prefix}.{joint}", k) for joint, k in tca.stiffening),
+            )
+            for tca in child.tcas
+        )
+        clash = [tca.name for tca in renamed if tca.name in mine]
+        if clash:
+            raise ValueError(f"prefix must make the TCAs' names unique, {clash} exist already")
+        self.spec.attach(child.spec, site=site, prefix=f"{prefix}.")
+        self.tcas += renamed
+        for key, value in child.sites.items():
+            if names is None or key in names:
+                self.sites[f"{prefix}.{key}"] = f"{prefix}.{value}"
+
+
+def new_spec(name: str) -> mujoco.MjSpec:
+    """An empty specification with the solver settings of all models of this package.
+
+    The ``discrete`` integrator takes springs, dampers and affine actuators implicitly and is
+    stable at any time step; see the page on soft bodies in the documentation.
+    """
+    spec = mujoco.MjSpec()
+    spec.modelname = name
+    spec.compiler.degree = False
+    spec.compiler.autolimits = True
+    option = spec.option
+    option.integrator = mujoco.mjtIntegrator.mjINT_DISCRETE
+    option.timestep = 2e-3
+    option.solver = mujoco.mjtSolver.mjSOL_NEWTON
+    option.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
+    option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
+    option.impratio = 10.0
+    return spec

@@ -1,0 +1,47 @@
+"""Static scenes: an arena from a file, with objects from files put into it."""
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import mujoco
+
+from tca_mj.model.part import Part, new_spec
+
+
+def load(path: Path) -> mujoco.MjSpec:
+    """Reads an MJCF file into a specification.
+
+    Raises:
+        ValueError: If the file does not exist or is no MJCF.
+    """
+    if not path.is_file():
+        raise ValueError(f"path must be an MJCF file, got {path}")
+    return mujoco.MjSpec.from_file(str(path))
+
+
+def scene(arena: Path, robot: Part, objects: Mapping[str, Path], *, name: str = "robot") -> Part:
+    """Puts a robot and objects into an arena.
+
+    The robot's names get ``name`` and a dot in front, an object's names its key and a dot.
+
+    Args:
+        arena: MJCF file of the arena; its visual settings become the scene's.
+        robot: The robot; it is used up.
+        objects: MJCF files of the objects, by the name that each gets in the scene. Each file's
+            bodies are put into the world where the file says.
+        name: Name of the robot in the scene.
+
+    Returns:
+        The scene as a part, whose TCAs and named sites are the robot's.
+    """
+    spec = load(arena)
+    settings = new_spec("scene").option
+    for field in ("integrator", "timestep", "solver", "jacobian", "cone", "impratio"):
+        setattr(spec.option, field, getattr(settings, field))
+    spec.compiler.degree = False
+    origin = spec.worldbody.add_site(name="origin", group=4)
+    part = Part(spec)
+    part.attach(robot, to="origin", prefix=name)
+    for key, path in objects.items():
+        spec.attach(load(path), site=origin, prefix=f"{key}.")
+    return part

@@ -1,0 +1,80 @@
+"""The 3D bending module: a silicone cylinder with three parallel TCAs (Sun, Section 4.1.3)."""
+
+from dataclasses import dataclass, field
+
+from tca_mj.model.chain import beam
+from tca_mj.model.part import Part, new_spec
+from tca_mj.model.tendon import route_passes, route_tca
+from tca_mj.rod.beam import BeamSpec
+from tca_mj.routes import leg_length, parallel
+from tca_mj.tca import CATALOGUE, TcaSpec
+
+SILICONE_DENSITY = 1070.0  # Ecoflex 00-30, data sheet of Smooth-On [kg/m³]
+SILICONE_YOUNG = 0.125e6  # Ecoflex 00-30, Sun, Section 5.3 [Pa]
+SILICONE_SHEAR = SILICONE_YOUNG / 3.0  # incompressible, Sun, Section 5.3 [Pa]
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class BendingSpec:
+    """A cylinder with parallel TCAs.
+
+    Two diameters, because the published figures contradict each other: TCAs 4 mm from the
+    centre do not fit a body of 4.5 mm diameter (Sun, Section 5.3.1), yet only the stiffness of
+    that section agrees with the measured angles. So the section that carries load has 4.5 mm
+    and the body that is seen, touched and weighed has 9 mm.
+
+    Attributes:
+        length: Length of the module [m]. Sun, Section 5.3.1.
+        diameter: Diameter of the section that carries load [m]. Sun, Section 5.3.
+        outer_diameter: Diameter of the body [m]. Estimate: 4.5 mm read as a radius.
+        offset: Distance of the TCAs from the centre line [m]. Sun, Section 5.3.1.
+        count: Number of TCAs, at equal angles from the x axis on.
+        nodes: Nodes of the chain; 8 keep the tip within 1 % of the length of the limit of many
+            nodes up to 160°.
+        tca: The kind of TCA, cut to the module's length.
+    """
+
+    length: float = 45e-3
+    diameter: float = 4.5e-3
+    outer_diameter: float = 9e-3
+    offset: float = 4e-3
+    count: int = 3
+    nodes: int = 8
+    tca: TcaSpec = field(default_factory=lambda: CATALOGUE["free-stroke"])
+
+    @property
+    def body(self) -> BeamSpec:
+        """The soft body without its TCAs."""
+        return BeamSpec.circular(
+            length=self.length,
+            diameter=self.diameter,
+            outer_diameter=self.outer_diameter,
+            young=SILICONE_YOUNG,
+            shear=SILICONE_SHEAR,
+            density=SILICONE_DENSITY,
+        )
+
+
+def bending_module(spec: BendingSpec | None = None) -> Part:
+    """Builds the module: base at the origin, axis along z, TCA 0 on the x side.
+
+    Returns:
+        A part with the TCAs ``tca0``, ``tca1``, ... and the site ``tip``.
+
+    Raises:
+        ValueError: If the geometry cannot be built.
+    """
+    spec = spec or BendingSpec()
+    mjspec = new_spec("bending")
+    chain = beam(mjspec.worldbody, spec.body, nodes=spec.nodes, name="body")
+    chain.tip.add_site(name="tip", pos=[0.0, 0.0, chain.local(spec.nodes)], group=4)
+    tcas = tuple(
+        route_tca(
+            mjspec,
+            spec.tca.of_length(leg_length(route, spec.length)),
+            route_passes(chain, route),
+            name=f"tca{i}",
+        )
+        for i, route in enumerate(parallel(spec.count, spec.offset))
+    )
+    return Part(mjspec, tcas, {"tip": "tip"})

@@ -1,0 +1,138 @@
+"""A normally closed pair of soft fingers that one U-shaped TCA opens (Sun, Section 4.1.1).
+
+The gripper is one soft body, held in the middle and bent to a ring whose ends meet. Its TCA runs
+on the outside of the ring, through the whole body and back; contracting, it straightens the body
+and the fingers open. Cold, they close and hold an object without power.
+"""
+
+import math
+from dataclasses import dataclass, field, replace
+
+from tca_mj.model.chain import Chain, beam
+from tca_mj.model.part import Part, new_spec
+from tca_mj.model.tendon import Pass, route_tca
+from tca_mj.modules.bending import SILICONE_DENSITY, SILICONE_SHEAR, SILICONE_YOUNG
+from tca_mj.rod.beam import BeamSpec
+from tca_mj.routes import UTurn, leg_length
+from tca_mj.tca import CATALOGUE, TcaSpec
+
+_HALF = math.sqrt(0.5)
+# Rotations of the fingers' bases, wxyz: z to +x or -x of the mount, x (the outside) to its -z.
+_FRAMES = ((_HALF, 0.0, _HALF, 0.0), (0.0, -_HALF, 0.0, _HALF))
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class FingerPairSpec:
+    """A soft body bent to a ring, and the TCA that opens it.
+
+    Attributes:
+        length: Length of the whole body, both fingers [m]. Sun, Section 4.1.1.
+        width: Section across the bending plane [m]. Sun, Section 5.3.
+        thickness: Section in the bending plane [m]. Sun, Section 5.3 (3 x 6 mm); only the longer
+            side has room for a TCA 2.5 mm off the centre.
+        offset: Distance of the TCA from the centre line, on the outside [m]. Sun, Section 5.3.2.
+        half_width: Half the distance between the two legs of the U [m]. Estimate.
+        closure: Angle by which each finger is bent when nothing is between them [rad]. Half a
+            turn closes the ring.
+        layers: Bending and axial stiffness with the two elastomer layers that bend the body, over
+            that of the body alone. Estimate: the measured gripping force is carried by them.
+        nodes: Nodes of each finger.
+        friction: Sliding friction of the silicone. Estimate.
+        tca: The kind of TCA, cut to the route's length in the closed gripper.
+        sheath_capacity: Heat capacity of the silicone heated with the TCA [J/K]. Estimate.
+    """
+
+    length: float = 35e-3
+    width: float = 3e-3
+    thickness: float = 6e-3
+    offset: float = 2.5e-3
+    half_width: float = 0.8e-3
+    closure: float = math.pi
+    layers: float = 2.0
+    nodes: int = 6
+    friction: float = 1.0
+    tca: TcaSpec = field(default_factory=lambda: CATALOGUE["free-stroke"])
+    sheath_capacity: float = 0.06
+
+    @property
+    def body(self) -> BeamSpec:
+        """One finger: section x is thickness, outside positive; it bends about y."""
+        core = BeamSpec.box(
+            length=self.length / 2.0,
+            width=self.thickness,
+            height=self.width,
+            young=SILICONE_YOUNG,
+            shear=SILICONE_SHEAR,
+            density=SILICONE_DENSITY,
+        )
+        return replace(
+            core,
+            bending=(core.bending[0] * self.layers, core.bending[1] * self.layers),
+            torsion=core.torsion * self.layers,
+            stretching=core.stretching * self.layers,
+            shearing=core.shearing * self.layers,
+            curvature=(0.0, -self.closure / core.length, 0.0),
+        )
+
+    @property
+    def route(self) -> UTurn:
+        """The TCA's two legs along one finger."""
+        return UTurn.parallel(self.offset, self.half_width)
+
+
+def finger_pair(spec: FingerPairSpec | None = None) -> Part:
+    """Builds the gripper: held at the origin, the fingers in the x-z plane, their tips below z.
+
+    The z axis of the base points from the mount to where the finger tips meet.
+
+    Returns:
+        A part with the TCA ``tca`` and the sites ``tip0``, ``tip1`` (finger tips) and ``grasp``
+        (point of the mount's frame where the tips meet).
+
+    Raises:
+        ValueError: If the geometry cannot be built.
+    """
+    spec = spec or FingerPairSpec()
+    body, route = spec.body, spec.route
+    mjspec = new_spec("gripper")
+    ring = spec.length / (2.0 * spec.closure)  # radius of the closed ring's centre line
+    fingers = []
+    for side in range(2):
+        fingers.append(
+            beam(
+                mjspec.worldbody,
+                body,
+                nodes=spec.nodes,
+                name=f"finger{side}",
+                pos=[0.0, 0.0, spec.thickness / 2.0],
+                quat=_FRAMES[side],
+                friction=(spec.friction, 0.005, 0.0001),
+            )
+        )
+        fingers[side].tip.add_site(
+            name=f"tip{side}", pos=[0.0, 0.0, fingers[side].local(spec.nodes)], group=4
+        )
+    mjspec.worldbody.add_site(
+        name="grasp", pos=[0.0, 0.0, spec.thickness / 2.0 + 2.0 * ring], group=4
+    )
+    routed = route_tca(
+        mjspec,
+        replace(
+            spec.tca.of_length(4.0 * leg_length(route.out, body.length, body.curvature)),
+            sheath_capacity=spec.sheath_capacity,
+        ),
+        _passes(fingers, route),
+        name="tca",
+    )
+    return Part(mjspec, (routed,), {"tip0": "tip0", "tip1": "tip1", "grasp": "grasp"})
+
+
+def _passes(fingers: list[Chain], route: UTurn) -> tuple[Pass, ...]:
+    """From the tip of finger 0 to that of finger 1 on one side, and back on the other."""
+    first, second = fingers
+    return (
+        Pass(first, route.out, down=True),
+        Pass(second, route.back),
+        Pass(second, route.out, down=True),
+        Pass(first, route.back),
+    )

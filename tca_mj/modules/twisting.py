@@ -1,0 +1,89 @@
+"""The twisting module: a silicone cylinder wrapped by one TCA (Sun, Section 4.1.2)."""
+
+from dataclasses import dataclass, field, replace
+
+from tca_mj.model.chain import beam
+from tca_mj.model.part import Part, new_spec
+from tca_mj.model.tendon import route_passes, route_tca
+from tca_mj.modules.bending import SILICONE_DENSITY, SILICONE_SHEAR, SILICONE_YOUNG
+from tca_mj.rod.beam import BeamSpec
+from tca_mj.routes import Helix, Route, UTurn, leg_length
+from tca_mj.tca import CATALOGUE, TcaSpec
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class TwistingSpec:
+    """A cylinder with a TCA wound round it as a single or a double helix.
+
+    Attributes:
+        length: Length of the module [m]. Sun, Section 5.3.2.
+        diameter: Diameter of the section that carries load [m]. Estimate: with the printed
+            4.5 mm the double helix would turn less than the single one, against the measurement;
+            that takes more than 5.7 mm.
+        outer_diameter: Diameter of the body with the wrapped tube [m]. Sun, Section 4.1.4:
+            the arm is 10 mm wide.
+        radius: Distance of the TCA from the centre line [m]. Sun, Section 5.3.2.
+        turns: Turns of TCA on the module, over both halves if it is folded [-]; Sun,
+            Section 5.3.2. Positive is right-handed: then a pull turns the tip clockwise, seen
+            from the tip.
+        double: Whether the TCA is folded in half first.
+        nodes: Nodes of the chain.
+        tca: The kind of TCA, cut to the route's length.
+        sheath_capacity: Heat capacity of the elastomer tube round the TCA [J/K]. Fitted to the
+            half turn after 28 W for 2 s (Sun, Section 4.1.2).
+        sheath_area: Surface of that tube, 3.2 mm thick, per length of TCA [m]. Estimate: the
+            tube's whole surface.
+    """
+
+    length: float = 16e-3
+    diameter: float = 6e-3
+    outer_diameter: float = 10e-3
+    radius: float = 3.5e-3
+    turns: float = 5.0
+    double: bool = True
+    nodes: int = 12
+    tca: TcaSpec = field(default_factory=lambda: CATALOGUE["free-stroke"])
+    sheath_capacity: float = 0.39
+    sheath_area: float = 3.14159 * 3.2e-3
+
+    @property
+    def body(self) -> BeamSpec:
+        """The soft body without its TCA."""
+        return BeamSpec.circular(
+            length=self.length,
+            diameter=self.diameter,
+            outer_diameter=self.outer_diameter,
+            young=SILICONE_YOUNG,
+            shear=SILICONE_SHEAR,
+            density=SILICONE_DENSITY,
+        )
+
+    @property
+    def route(self) -> Route:
+        """Where the TCA runs."""
+        if self.double:
+            return UTurn.double_helix(self.radius, self.turns / 2.0)
+        return Helix(self.radius, self.turns)
+
+
+def twisting_module(spec: TwistingSpec | None = None) -> Part:
+    """Builds the module: base at the origin, axis along z.
+
+    Returns:
+        A part with the TCA ``tca`` and the site ``tip``.
+
+    Raises:
+        ValueError: If the geometry cannot be built, for example with too few nodes per turn.
+    """
+    spec = spec or TwistingSpec()
+    mjspec = new_spec("twisting")
+    chain = beam(mjspec.worldbody, spec.body, nodes=spec.nodes, name="body")
+    chain.tip.add_site(name="tip", pos=[0.0, 0.0, chain.local(spec.nodes)], group=4)
+    length = sum(leg_length(leg, spec.length) for leg in spec.route.legs)
+    tca = replace(
+        spec.tca.of_length(length),
+        sheath_capacity=spec.sheath_capacity,
+        sheath_area=spec.sheath_area * length,
+    )
+    routed = route_tca(mjspec, tca, route_passes(chain, spec.route), name="tca")
+    return Part(mjspec, (routed,), {"tip": "tip"})

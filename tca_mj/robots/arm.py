@@ -1,0 +1,120 @@
+"""The soft arm of Sun, Sections 4.1.4 and 5.3.2: bending module, wrist and gripper in series.
+
+The arm hangs from a base that moves only up and down.
+"""
+
+from dataclasses import dataclass, field
+
+import mujoco
+
+from tca_mj.model.part import Part, new_spec
+from tca_mj.modules.bending import BendingSpec, bending_module
+from tca_mj.modules.finger import FingerPairSpec, finger_pair
+from tca_mj.modules.twisting import TwistingSpec, twisting_module
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class ArmSpec:
+    """The arm and its base.
+
+    Attributes:
+        bending: The arm proper.
+        twisting: The wrist.
+        gripper: The hand.
+        connector: Thickness of the rigid discs between the modules [m]. Estimate.
+        connector_mass: Mass of each of them [kg]. Estimate: it brings the arm to the 6 g of
+            Sun, Section 4.1.4.
+        height: Height of the base above the ground at the start [m].
+        travel: Lowest and highest height of the base [m].
+        speed: Largest speed of the base [m/s]. Estimate.
+    """
+
+    bending: BendingSpec = field(default_factory=BendingSpec)
+    twisting: TwistingSpec = field(default_factory=TwistingSpec)
+    gripper: FingerPairSpec = field(default_factory=FingerPairSpec)
+    connector: float = 1.5e-3
+    connector_mass: float = 0.2e-3
+    height: float = 0.14
+    travel: tuple[float, float] = (0.07, 0.18)
+    speed: float = 0.04
+
+    def __post_init__(self) -> None:
+        for name in ("connector", "connector_mass", "speed"):
+            if not getattr(self, name) > 0.0:
+                raise ValueError(f"{name} must be above 0, got {getattr(self, name)}")
+        low, high = self.travel
+        if not 0.0 < low < high:
+            raise ValueError(f"travel must be two heights, 0 < low < high, got {self.travel}")
+        if not low <= self.height <= high:
+            raise ValueError(f"height must be within travel {self.travel}, got {self.height}")
+
+
+_DOWN = (0.0, 1.0, 0.0, 0.0)  # z to -z, half a turn about x
+
+
+def arm(spec: ArmSpec | None = None) -> Part:
+    """Builds the arm, hanging from a base whose slide ``lift`` moves it up and down.
+
+    The slide's position is the height above the ground. It is driven by the actuator ``lift``,
+    whose control is a velocity [m/s].
+
+    Returns:
+        A part with the TCAs ``bending.tca0`` to ``bending.tca2``, ``wrist.tca`` and
+        ``gripper.tca``, in this order, and the sites ``bending.tip``, ``wrist.tip``,
+        ``gripper.tip0``, ``gripper.tip1`` and ``gripper.grasp``.
+
+    Raises:
+        ValueError: If the geometry cannot be built.
+    """
+    spec = spec or ArmSpec()
+    mjspec = new_spec("arm")
+    base = mjspec.worldbody.add_body(name="base")
+    base.add_joint(
+        name="lift",
+        type=mujoco.mjtJoint.mjJNT_SLIDE,
+        axis=[0.0, 0.0, 1.0],
+        ref=0.0,
+        range=list(spec.travel),
+        limited=True,
+    )
+    base.add_geom(
+        name="carriage",
+        type=mujoco.mjtGeom.mjGEOM_BOX,
+        size=[14e-3, 14e-3, 4e-3],
+        pos=[0.0, 0.0, 4e-3],
+        mass=0.1,
+        rgba=[0.25, 0.27, 0.3, 1.0],
+        contype=0,
+        conaffinity=0,
+    )
+    base.add_site(name="mount", quat=list(_DOWN), group=4)
+    lift = mjspec.add_actuator(name="lift", trntype=mujoco.mjtTrn.mjTRN_JOINT, target="lift")
+    lift.set_to_intvelocity(kp=2000.0, dampratio=1.0)
+    lift.ctrlrange = [-spec.speed, spec.speed]
+    lift.actlimited = 1
+    lift.actrange = list(spec.travel)
+
+    part = Part(mjspec)
+    part.attach(bending_module(spec.bending), to="mount", prefix="bending")
+    _connector(part, "bending.tip", spec, spec.bending.outer_diameter / 2.0)
+    part.attach(twisting_module(spec.twisting), to="bending.tip.far", prefix="wrist")
+    _connector(part, "wrist.tip", spec, spec.twisting.outer_diameter / 2.0)
+    part.attach(finger_pair(spec.gripper), to="wrist.tip.far", prefix="gripper")
+    return part
+
+
+def _connector(part: Part, site: str, spec: ArmSpec, radius: float) -> None:
+    """A rigid disc on the tip ``site`` of a module, with the site ``<site>.far`` behind it."""
+    near = part.spec.site(site)
+    z = float(near.pos[2])
+    near.parent.add_geom(
+        name=f"{site}.connector",
+        type=mujoco.mjtGeom.mjGEOM_CYLINDER,
+        size=[radius, spec.connector / 2.0, 0.0],
+        pos=[0.0, 0.0, z + spec.connector / 2.0],
+        mass=spec.connector_mass,
+        rgba=[0.3, 0.32, 0.36, 1.0],
+        contype=0,
+        conaffinity=1,
+    )
+    near.parent.add_site(name=f"{site}.far", pos=[0.0, 0.0, z + spec.connector], group=4)

@@ -1,0 +1,197 @@
+"""What a soft beam is made of: section, stiffness, mass and reference shape."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True, slots=True)
+class Outline:
+    """Outer contour of a section: what is seen and touched, and what holds the TCAs.
+
+    Attributes:
+        half_width: Half the extent along the section's x axis, or the radius of a disc [m].
+        half_height: Half the extent along y [m].
+        round: Whether the section is a disc (then both halves are equal).
+    """
+
+    half_width: float
+    half_height: float
+    round: bool = True
+
+    def __post_init__(self) -> None:
+        if not (self.half_width > 0.0 and self.half_height > 0.0):
+            raise ValueError(f"half_width and half_height must be above 0 m, got {self}")
+        if self.round and self.half_width != self.half_height:
+            raise ValueError(f"a round outline has half_width equal to half_height, got {self}")
+
+    def contains(self, x: float, y: float, tolerance: float = 1e-9) -> bool:
+        """Whether the point (x, y) [m] of the section lies inside the contour."""
+        if self.round:
+            return bool(np.hypot(x, y) <= self.half_width + tolerance)
+        inside_x = abs(x) <= self.half_width + tolerance
+        return bool(inside_x and abs(y) <= self.half_height + tolerance)
+
+    @property
+    def area(self) -> float:
+        """Area inside the contour [m²]."""
+        if self.round:
+            return np.pi * self.half_width**2
+        return 4.0 * self.half_width * self.half_height
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class BeamSpec:
+    """A uniform soft beam with z along its centre line.
+
+    The stiffness belongs to the *effective* section, mass and contact to the *outline*; the two
+    differ where a body has holes or is glued together from several materials.
+
+    Attributes:
+        length: Length L of the unloaded centre line [m].
+        bending: Bending stiffness EI about the section's x and y axes [N m²].
+        torsion: Torsional stiffness GJ [N m²].
+        stretching: Axial stiffness EA [N].
+        shearing: Shear stiffness GA, without a shear factor [N].
+        line_density: Mass per length [kg/m].
+        outline: Outer contour of the section.
+        curvature: Curvature u of the unloaded body in its own frame, shape (3,) [1/m].
+        damping_time: Kelvin-Voigt time: damping over stiffness [s]. The default is an estimate
+            for platinum-cure silicone.
+
+    Raises:
+        ValueError: If a number is not finite or not positive where it must be.
+    """
+
+    length: float
+    bending: tuple[float, float]
+    torsion: float
+    stretching: float
+    shearing: float
+    line_density: float
+    outline: Outline
+    curvature: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    damping_time: float = 1e-2
+
+    def __post_init__(self) -> None:
+        positive = {
+            "length": self.length,
+            "bending[0]": self.bending[0],
+            "bending[1]": self.bending[1],
+            "torsion": self.torsion,
+            "stretching": self.stretching,
+            "shearing": self.shearing,
+            "line_density": self.line_density,
+        }
+        for field, value in positive.items():
+            if not (np.isfinite(value) and value > 0.0):
+                raise ValueError(f"{field} must be finite and above 0, got {value}")
+        if not (np.isfinite(self.damping_time) and self.damping_time >= 0.0):
+            raise ValueError(f"damping_time must be at least 0 s, got {self.damping_time}")
+        if len(self.curvature) != 3 or not np.all(np.isfinite(self.curvature)):
+            raise ValueError(f"curvature must be three finite numbers, got {self.curvature}")
+
+    @property
+    def mass(self) -> float:
+        """Mass of the beam [kg]."""
+        return self.line_density * self.length
+
+    @classmethod
+    def circular(
+        cls,
+        *,
+        length: float,
+        diameter: float,
+        young: float,
+        shear: float,
+        density: float,
+        outer_diameter: float | None = None,
+        curvature: tuple[float, float, float] = (0.0, 0.0, 0.0),
+        damping_time: float = 1e-2,
+    ) -> "BeamSpec":
+        """A round beam.
+
+        Args:
+            length: Length [m].
+            diameter: Diameter of the section that carries load [m].
+            young: Young's modulus E [Pa].
+            shear: Shear modulus G [Pa].
+            density: Density of the whole body [kg/m³].
+            outer_diameter: Diameter of the outline, ``diameter`` by default [m].
+            curvature: Reference curvature [1/m].
+            damping_time: Kelvin-Voigt time [s].
+
+        Raises:
+            ValueError: If a dimension or a modulus is not positive.
+        """
+        _require_positive(length=length, diameter=diameter, young=young, shear=shear,
+                          density=density)  # fmt: skip
+        area = np.pi * diameter**2 / 4.0
+        inertia = np.pi * diameter**4 / 64.0
+        radius = (diameter if outer_diameter is None else outer_diameter) / 2.0
+        outline = Outline(radius, radius)
+        return cls(
+            length=length,
+            bending=(young * inertia, young * inertia),
+            torsion=2.0 * shear * inertia,
+            stretching=young * area,
+            shearing=shear * area,
+            line_density=density * outline.area,
+            outline=outline,
+            curvature=curvature,
+            damping_time=damping_time,
+        )
+
+    @classmethod
+    def box(
+        cls,
+        *,
+        length: float,
+        width: float,
+        height: float,
+        young: float,
+        shear: float,
+        density: float,
+        curvature: tuple[float, float, float] = (0.0, 0.0, 0.0),
+        damping_time: float = 1e-2,
+    ) -> "BeamSpec":
+        """A beam of rectangular section, ``width`` along x and ``height`` along y.
+
+        The torsion constant is Saint-Venant's, by its series (Timoshenko & Goodier, Theory of
+        Elasticity, section 109), not the polar moment, which is too large by 1.8 for 3 x 6 mm.
+
+        Raises:
+            ValueError: If a dimension or a modulus is not positive.
+        """
+        _require_positive(length=length, width=width, height=height, young=young, shear=shear,
+                          density=density)  # fmt: skip
+        area = width * height
+        return cls(
+            length=length,
+            bending=(young * width * height**3 / 12.0, young * height * width**3 / 12.0),
+            torsion=shear * torsion_constant(width, height),
+            stretching=young * area,
+            shearing=shear * area,
+            line_density=density * area,
+            outline=Outline(width / 2.0, height / 2.0, round=False),
+            curvature=curvature,
+            damping_time=damping_time,
+        )
+
+
+def torsion_constant(width: float, height: float) -> float:
+    """Saint-Venant's torsion constant J of a rectangle [m⁴].
+
+    J = a b³ (1/3 - 64/π⁵ b/a Σ tanh(nπa/2b)/n⁵), n odd, a the longer side
+    (Timoshenko & Goodier, Theory of Elasticity, section 109).
+    """
+    longer, shorter = max(width, height), min(width, height)
+    n = np.arange(1, 40, 2, dtype=np.float64)
+    series = np.sum(np.tanh(n * np.pi * longer / (2.0 * shorter)) / n**5)
+    return float(longer * shorter**3 * (1 / 3 - 64.0 / np.pi**5 * shorter / longer * series))
+
+
+def _require_positive(**values: float) -> None:
+    for field, value in values.items():
+        if not (np.isfinite(value) and value > 0.0):
+            raise ValueError(f"{field} must be finite and above 0, got {value}")

@@ -1,0 +1,151 @@
+"""Curves along which a TCA is laid in a soft body.
+
+A route is a tuple of *legs*. A leg is a curve in the body frame, given by its offset from the
+centre line as a function of s, which runs from 0 at the body's base to 1 at its tip. The TCA
+follows the first leg from base to tip, the second one from tip to base, and so on; between two
+legs it crosses over inside the end section. One TCA has one tension, the same in all its legs.
+
+Body frame: z along the centre line from base to tip, x and y in the cross-section.
+"""
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+
+@dataclass(frozen=True, slots=True)
+class Helix:
+    """A TCA wound round the centre line; ``turns=0`` gives the parallel route.
+
+    Attributes:
+        radius: Distance to the centre line, not negative [m].
+        turns: Number of turns over the whole body; positive is right-handed.
+        phase: Angle at the base, from the cross-section's x axis towards y [rad].
+
+    Raises:
+        ValueError: If a number is not finite or the radius is negative.
+    """
+
+    radius: float
+    turns: float = 0.0
+    phase: float = 0.0
+
+    def __post_init__(self) -> None:
+        for field in ("radius", "turns", "phase"):
+            if not np.isfinite(getattr(self, field)):
+                raise ValueError(f"{field} must be finite, got {getattr(self, field)}")
+        if self.radius < 0.0:
+            raise ValueError(f"radius must be at least 0 m, got {self.radius}")
+
+    @property
+    def legs(self) -> tuple["Helix", ...]:
+        """The route as a tuple of legs: a helix is its own single leg."""
+        return (self,)
+
+    def offset(self, s: ArrayLike) -> NDArray[np.float64]:
+        """Offset from the centre line at ``s`` in [0, 1], shape (..., 2) [m]."""
+        angle = self.phase + 2.0 * np.pi * self.turns * np.asarray(s, dtype=np.float64)
+        return self.radius * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+
+    def slope(self, s: ArrayLike) -> NDArray[np.float64]:
+        """Derivative of the offset by ``s``, shape (..., 2) [m]."""
+        rate = 2.0 * np.pi * self.turns
+        angle = self.phase + rate * np.asarray(s, dtype=np.float64)
+        return self.radius * rate * np.stack([-np.sin(angle), np.cos(angle)], axis=-1)
+
+
+@dataclass(frozen=True, slots=True)
+class UTurn:
+    """One TCA folded in half: out along one leg, back along another one.
+
+    Two parallel legs make the U of a bending finger, two helices of the same hand the double
+    helix of a twisting module.
+
+    Attributes:
+        out: The leg from base to tip.
+        back: The leg from tip to base, also described from base to tip.
+    """
+
+    out: Helix
+    back: Helix
+
+    @property
+    def legs(self) -> tuple[Helix, ...]:
+        """The two legs, in the order in which the TCA follows them."""
+        return (self.out, self.back)
+
+    @classmethod
+    def parallel(cls, offset: float, half_width: float, direction: float = 0.0) -> "UTurn":
+        """A U of two straight legs.
+
+        Args:
+            offset: Distance of the plane of the U from the centre line [m].
+            half_width: Half the distance between the legs, not negative [m].
+            direction: Angle of the offset, from x towards y [rad].
+
+        Raises:
+            ValueError: If the half width is negative.
+        """
+        if not half_width >= 0.0:
+            raise ValueError(f"half_width must be at least 0 m, got {half_width}")
+        radius, angle = float(np.hypot(offset, half_width)), float(np.arctan2(half_width, offset))
+        return cls(Helix(radius, phase=direction - angle), Helix(radius, phase=direction + angle))
+
+    @classmethod
+    def double_helix(cls, radius: float, turns: float, phase: float = 0.0) -> "UTurn":
+        """A TCA folded in half and wound as two helices of ``turns`` turns, half a turn apart."""
+        return cls(Helix(radius, turns, phase), Helix(radius, turns, phase + np.pi))
+
+
+class Route(Protocol):
+    """Anything that can say which legs it has."""
+
+    @property
+    def legs(self) -> tuple[Helix, ...]:
+        """Legs in the order in which the TCA follows them, alternately up and down the body."""
+        ...
+
+
+def parallel(count: int, radius: float, phase: float = 0.0) -> tuple[Helix, ...]:
+    """Routes of ``count`` straight TCAs at equal angles round the centre line.
+
+    Raises:
+        ValueError: If the count is below one.
+    """
+    if count < 1:
+        raise ValueError(f"count must be at least 1, got {count}")
+    return tuple(Helix(radius, phase=phase + 2.0 * np.pi * i / count) for i in range(count))
+
+
+def leg_length(
+    leg: Helix, body_length: float, curvature: ArrayLike = (0.0, 0.0, 0.0), points: int = 513
+) -> float:
+    """Length of a leg in a body of uniform reference curvature.
+
+    Integrates |w|, w = e_z + u x r + r', the tangent of the leg per length of the centre line
+    (kinematics of an off-centre curve in a Cosserat rod).
+
+    Args:
+        leg: The leg.
+        body_length: Length of the centre line [m].
+        curvature: Reference curvature u of the body in its own frame, shape (3,) [1/m].
+        points: Number of points of the trapezoid rule.
+
+    Returns:
+        Path length [m].
+    """
+    s = np.linspace(0.0, 1.0, points)
+    r = leg.offset(s)
+    slope = leg.slope(s) / body_length
+    u = np.asarray(curvature, dtype=np.float64)
+    w = np.stack(
+        [
+            slope[:, 0] - u[2] * r[:, 1],
+            slope[:, 1] + u[2] * r[:, 0],
+            1.0 + u[0] * r[:, 1] - u[1] * r[:, 0],
+        ],
+        axis=-1,
+    )
+    return float(np.trapezoid(np.linalg.norm(w, axis=-1), s) * body_length)

@@ -1,0 +1,201 @@
+"""The coupled step: electrical power, heat and tension of the TCAs, motion of the body.
+
+The TCAs' law F(l, T) is evaluated once per ``tca_period`` and handed to MuJoCo linearised in the
+length, F + k (l' - l), as a native actuator that MuJoCo evaluates in every physics step. Holding
+the tension constant instead would make a stiff TCA a delayed spring, which oscillates.
+"""
+
+from dataclasses import replace
+
+import mujoco
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from tca_mj.model.part import Part
+from tca_mj.tca import Pull, TcaBank, TcaState
+
+_DIVERGENCE = (
+    mujoco.mjtWarning.mjWARN_BADQPOS,
+    mujoco.mjtWarning.mjWARN_BADQVEL,
+    mujoco.mjtWarning.mjWARN_BADQACC,
+    mujoco.mjtWarning.mjWARN_BADCTRL,
+)
+
+
+class SimulationDiverged(ArithmeticError):
+    """The simulation left the range of finite, physical states."""
+
+
+class Simulation:
+    """A built part with its TCAs, in motion.
+
+    Attributes:
+        model: Compiled MuJoCo model.
+        data: MuJoCo's state.
+        bank: The TCAs.
+        tca: Their thermal state.
+        pull: Their linearised law at the last update.
+        tca_names: Names, in the order of the actuator axis.
+        tendon: Ids of their tendons in ``model``, shape (n,).
+        tca_period: Time between two updates of the TCAs [s].
+    """
+
+    def __init__(
+        self, part: Part, *, timestep: float = 2e-3, tca_period: float = 2e-2, ambient: float = 25.0
+    ) -> None:
+        """Compiles ``part``; its specification can still be changed and compiled again.
+
+        Args:
+            part: What to simulate.
+            timestep: Physics time step [s].
+            tca_period: Time between two updates of the TCAs, a multiple of ``timestep`` [s].
+            ambient: Temperature of the surroundings and of the cold TCAs [°C].
+
+        Raises:
+            ValueError: If a time is not positive or the period is no multiple of the time step.
+        """
+        if not (np.isfinite(timestep) and timestep > 0.0):
+            raise ValueError(f"timestep must be finite and above 0 s, got {timestep}")
+        substeps = round(tca_period / timestep) if np.isfinite(tca_period) else 0
+        if substeps < 1 or abs(substeps * timestep - tca_period) > 1e-9:
+            raise ValueError(
+                f"tca_period must be a positive multiple of timestep {timestep} s, got {tca_period}"
+            )
+        part.spec.option.timestep = timestep
+        self.model: mujoco.MjModel = part.spec.compile()
+        self.data = mujoco.MjData(self.model)
+        self.tca_period = tca_period
+        self.tca_names = tuple(tca.name for tca in part.tcas)
+        self.bank = TcaBank(tuple(replace(tca.spec, ambient=ambient) for tca in part.tcas))
+        self._substeps = substeps
+
+        model = self.model
+        self.tendon = np.array([model.tendon(name).id for name in self.tca_names], dtype=np.int64)
+        self._actuator = np.array(
+            [model.actuator(name).id for name in self.tca_names], dtype=np.int64
+        )
+        self._zero_gain = model.actuator_biasprm[self._actuator].copy()
+
+        # Joints whose stiffness depends on the tensions: k = k0 + coupling @ tension.
+        joints = sorted({model.joint(j).id for tca in part.tcas for j, _ in tca.stiffening})
+        row = {joint: i for i, joint in enumerate(joints)}
+        self._coupling = np.zeros((len(joints), len(part.tcas)))
+        for column, tca in enumerate(part.tcas):
+            for name, value in tca.stiffening:
+                self._coupling[row[model.joint(name).id], column] += value
+        self._joint = np.array(joints, dtype=np.int64)
+        self._joint_qpos = model.jnt_qposadr[self._joint]
+        self._stiffness = model.jnt_stiffness[self._joint].copy()
+        self._spring = model.qpos_spring[self._joint_qpos].copy()
+
+        # The bodies' unloaded shape is that of their springs; TCAs are measured from there.
+        hinges = model.jnt_type >= int(mujoco.mjtJoint.mjJNT_SLIDE)
+        address = model.jnt_qposadr[hinges]
+        self.data.qpos[address] = model.qpos_spring[address]
+        mujoco.mj_kinematics(model, self.data)
+        mujoco.mj_comPos(model, self.data)
+        mujoco.mj_tendon(model, self.data)
+        unloaded = self.data.ten_length[self.tendon]
+        rest = np.array([tca.spec.rest_length + tca.stretch for tca in part.tcas])
+        self._length_offset = rest - unloaded
+        self._start = self.data.qpos.copy()
+        self.tca: TcaState
+        self.pull: Pull
+        self.reset()
+
+    def reset(self) -> None:
+        """Back to the unloaded shape at ambient temperature, whatever happened before."""
+        model, data = self.model, self.data
+        mujoco.mj_resetData(model, data)
+        data.qpos[:] = self._start
+        model.actuator_biasprm[self._actuator] = self._zero_gain
+        model.jnt_stiffness[self._joint] = self._stiffness
+        model.qpos_spring[self._joint_qpos] = self._spring
+        self.tca = self.bank.rest()
+        self.power = np.zeros(self.n)
+        mujoco.mj_forward(model, data)
+        self._hand_over(self.bank.pull(self.tca, self.length))
+        mujoco.mj_forward(model, data)
+
+    @property
+    def n(self) -> int:
+        """Number of TCAs."""
+        return len(self.tca_names)
+
+    @property
+    def time(self) -> float:
+        """Simulated time [s]."""
+        return float(self.data.time)
+
+    @property
+    def temperature(self) -> NDArray[np.float64]:
+        """Temperature of each TCA, shape (n,) [°C]."""
+        return self.tca.temperature
+
+    @property
+    def length(self) -> NDArray[np.float64]:
+        """Length of each TCA along its route, shape (n,) [m]."""
+        return self.data.ten_length[self.tendon] + self._length_offset
+
+    @property
+    def tension(self) -> NDArray[np.float64]:
+        """Tension each TCA exerts on the body, shape (n,) [N]; a slack TCA has none."""
+        return -self.data.actuator_force[self._actuator]
+
+    @property
+    def resistance(self) -> NDArray[np.float64]:
+        """Electrical resistance of each TCA, shape (n,) [ohm]."""
+        return self.bank.resistance(self.tca, self.length)
+
+    @property
+    def energy(self) -> NDArray[np.float64]:
+        """Electrical energy put into each TCA so far, shape (n,) [J]."""
+        return self.tca.energy_in
+
+    def step(self, power: ArrayLike, duration: float) -> None:
+        """Advances by ``duration`` [s] at constant electrical ``power``, shape (n,) [W].
+
+        Raises:
+            ValueError: If the power has the wrong shape, is negative or not finite, or the
+                duration is no multiple of ``tca_period``.
+            SimulationDiverged: If the state is no longer finite.
+        """
+        power = np.array(power, dtype=np.float64)
+        if power.shape != (self.n,):
+            raise ValueError(f"power must have shape ({self.n},), got {power.shape}")
+        updates = round(duration / self.tca_period) if np.isfinite(duration) else 0
+        if updates < 1 or abs(updates * self.tca_period - duration) > 1e-9:
+            raise ValueError(
+                f"duration must be a positive multiple of tca_period {self.tca_period} s,"
+                f" got {duration}"
+            )
+        model, data = self.model, self.data
+        for _ in range(updates):
+            self.tca, pull = self.bank.advance(self.tca, power, self.length, self.tca_period)
+            self._hand_over(pull)
+            mujoco.mj_step(model, data, self._substeps)
+            self._check()
+        self.power = power
+
+    def _hand_over(self, pull: Pull) -> None:
+        """Gives MuJoCo the law F + k (l' - l) and the chains the stiffness they are owed."""
+        self.pull = pull
+        model = self.model
+        tendon_length = pull.length - self._length_offset
+        bias = model.actuator_biasprm
+        bias[self._actuator, 0] = -pull.tension + pull.stiffness * tendon_length
+        bias[self._actuator, 1] = -pull.stiffness
+        stiffness = self._stiffness + self._coupling @ np.maximum(pull.tension, 0.0)
+        model.jnt_stiffness[self._joint] = stiffness
+        # The added spring pulls towards the straight joint, the body's own to its reference.
+        model.qpos_spring[self._joint_qpos] = self._stiffness * self._spring / stiffness
+
+    def _check(self) -> None:
+        data = self.data
+        bad = [w for w in _DIVERGENCE if data.warning[int(w)].number > 0]
+        if bad or not (np.isfinite(data.qpos).all() and np.isfinite(data.qvel).all()):
+            names = ", ".join(str(w).rsplit("_", 1)[-1] for w in bad) or "not finite"
+            raise SimulationDiverged(
+                f"the state diverged at {data.time:.3f} s ({names}); a smaller timestep or less"
+                " power may help"
+            )
