@@ -1,0 +1,378 @@
+"""``TCA/ArmPickPlace-v0``: a soft arm lays an object into a cup (Sun, Section 4.1.4)."""
+
+from collections.abc import Mapping
+from typing import Any, ClassVar
+
+import gymnasium as gym
+import mujoco
+import numpy as np
+from dm_control.utils import rewards
+from numpy.typing import ArrayLike, NDArray
+
+from tca_mj.assets import mjcf
+from tca_mj.envs.table import Entry, Table
+from tca_mj.model.scene import scene
+from tca_mj.render import Offscreen, colour_tendons
+from tca_mj.robots.arm import ArmSpec, arm
+from tca_mj.sim import Simulation, SimulationDiverged
+
+Observation = NDArray[np.float32]
+Action = NDArray[np.float32]
+
+# Objects, with the width that the gripper has to reach round [m].
+OBJECTS = {"screwdriver": 8e-3, "pcb": 3.6e-3}
+
+OBSERVATION = Table(
+    [
+        Entry("base height", 1, 0.0, 0.3, "m"),
+        Entry("base velocity", 1, -1.0, 1.0, "m/s"),
+        Entry("TCA temperature", 5, -50.0, 300.0, "°C"),
+        Entry("TCA length", 5, 0.0, 0.3, "m"),
+        Entry("TCA tension", 5, 0.0, 5.0, "N"),
+        Entry("gripper opening", 1, 0.0, 0.05, "m"),
+        Entry("gripper position", 3, -0.5, 0.5, "m"),
+        Entry("gripper orientation", 4, -1.0, 1.0, "quaternion wxyz"),
+        Entry("object width", 1, 0.0, 0.02, "m"),
+        Entry("object position", 3, -0.5, 0.5, "m"),
+        Entry("object orientation", 4, -1.0, 1.0, "quaternion wxyz"),
+        Entry("object velocity", 3, -10.0, 10.0, "m/s"),
+        Entry("object angular velocity", 3, -2000.0, 2000.0, "rad/s"),
+        Entry("cup position", 3, -0.5, 0.5, "m"),
+    ]
+)
+ACTION = Table([Entry("TCA power", 5, -1.0, 1.0, "-"), Entry("base velocity", 1, -1.0, 1.0, "-")])
+
+_STAND = 25e-3  # height of the objects' centres on their stands [m]
+_PARKED = (0.09, 0.08)  # where the object that is not used stands [m]
+_CUP_RADIUS, _CUP_RIM = 18e-3, 14e-3  # of assets/mjcf/cup.xml [m]
+
+
+class ArmPickPlace(gym.Env[Observation, Action]):
+    """Pick up an object under the arm and lay it into a cup.
+
+    The arm hangs from a base that moves up and down. It senses its own TCAs and sees the object
+    and the cup; it acts by heating its TCAs and moving its base.
+
+    Action, shape (6,), all in [-1, 1]:
+        0-4: power of the TCAs ``bending.tca0`` to ``bending.tca2``, ``wrist.tca`` and
+            ``gripper.tca``; -1 is off, 1 is ``max_power``, linear in between.
+        5: velocity of the base over the arm's largest speed; positive is up.
+
+    Observation, shape (42,): see ``OBSERVATION``, whose rows have units and bounds. Positions and
+    orientations are those of the world; the gripper's are of the point where its tips meet when
+    closed, with the fingers in its x-z plane and z from mount to tips.
+
+    Reward, the sum of the terms in ``info["reward_terms"]``:
+        reach: Up to 0.1 while the gripper is at the object, 0.1 once that is in the cup.
+        carry: Up to 0.4 the closer the lifted object is to the mouth of the cup.
+        place: 20 in the step in which the object rests in the cup.
+        energy: Minus 0.002 per joule of electrical energy.
+
+    Reset: the arm is cold and at rest above the object, which lies on its stand, moved and turned
+    at random, with the cup somewhere on the side to which the arm bends best. Options:
+        object: ``"screwdriver"`` or ``"pcb"``.
+        object_position: x and y on the table, at most 5 mm from below the arm [m].
+        object_yaw: Angle of the object's long side, from world x, in ``yaw_range`` [rad].
+        cup_position: x and y of the cup, at a distance within ``cup_range`` [m].
+
+    Terminates when the object rests in the cup (success) or has fallen out of reach. Truncates
+    after the time limit, and with ``info["truncation_reason"]`` if a TCA is too hot or torn, or if
+    the simulation diverged.
+    """
+
+    metadata: ClassVar[dict[str, Any]] = {"render_modes": ["rgb_array"], "render_fps": 10}
+    max_power: ClassVar[NDArray[np.float64]] = np.array([2.0, 2.0, 2.0, 28.0, 10.0])  # [W]
+    max_temperature = 180.0  # annealing temperature of the TCAs, Sun, Table 2.1 [°C]
+    control_period = 0.1  # [s]
+    object_range = 5e-3  # largest offset of the object in x and in y [m]
+    yaw_range = (np.radians(120.0), np.radians(155.0))
+    cup_range = (26e-3, 32e-3)  # distance of the cup's axis from the arm's [m]
+    cup_angle = np.radians(20.0)  # of the cup's direction about -x
+
+    def __init__(
+        self,
+        *,
+        render_mode: str | None = None,
+        arm_spec: ArmSpec | None = None,
+        timestep: float = 2e-3,
+        camera: str = "front",
+        size: tuple[int, int] = (960, 720),
+    ) -> None:
+        """Builds the scene.
+
+        Args:
+            render_mode: None or ``"rgb_array"``.
+            arm_spec: The arm, by default the published one.
+            timestep: Physics time step [s].
+            camera: Camera of the pictures: ``front``, ``side`` or ``close``.
+            size: Width and height of the pictures [pixels].
+
+        Raises:
+            ValueError: If the render mode is unknown or the arm cannot be built.
+        """
+        if render_mode not in (None, *self.metadata["render_modes"]):
+            raise ValueError(
+                f"render_mode must be None or one of {self.metadata['render_modes']},"
+                f" got {render_mode!r}"
+            )
+        self.render_mode = render_mode
+        self.arm_spec = arm_spec or ArmSpec()
+        files = ["cup", *(name for kind in OBJECTS for name in (kind, f"{kind}_stand"))]
+        part = scene(
+            mjcf("arena.xml"), arm(self.arm_spec), {f: mjcf(f"{f}.xml") for f in files}, name="arm"
+        )
+        self.sim = Simulation(part, timestep=timestep)
+        self.observation_space = OBSERVATION.space
+        self.action_space = ACTION.space
+        self._camera, self._size = camera, size
+        self._screen: Offscreen | None = None
+        self._arguments = (render_mode, arm_spec, timestep, camera, size)
+        self.object = "screwdriver"
+        self._find(self.model)
+
+    def _find(self, model: mujoco.MjModel) -> None:
+        """Looks up the ids of what is observed and set."""
+        self._lift = model.joint("arm.lift")
+        self._grasp = model.site("arm.gripper.grasp").id
+        self._tips = [model.site(f"arm.gripper.tip{i}").id for i in range(2)]
+        self._free = {k: model.joint(f"{k}.free") for k in OBJECTS}
+        self._body = {k: model.body(f"{k}.{k}").id for k in OBJECTS}
+        self._stand = {k: int(model.body(f"{k}_stand.{k}_stand").mocapid[0]) for k in OBJECTS}
+        self._cup = int(model.body("cup.cup").mocapid[0])
+        names = [model.body(int(b)).name for b in model.geom_bodyid]
+        self._is_arm = np.array([name.startswith("arm.") for name in names])
+
+    # What tools that know Gymnasium's own MuJoCo environments look for.
+    @property
+    def model(self) -> mujoco.MjModel:
+        """The compiled model."""
+        return self.sim.model
+
+    @property
+    def data(self) -> mujoco.MjData:
+        """MuJoCo's state."""
+        return self.sim.data
+
+    @property
+    def dt(self) -> float:
+        """Time of one step [s]."""
+        return self.control_period
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Observation, dict[str, Any]]:
+        """Starts an episode; see the class for the options.
+
+        Raises:
+            ValueError: If an option is unknown or out of its range.
+        """
+        super().reset(seed=seed)
+        setup = self._setup(options or {})
+        self.object = setup["object"]
+        self.sim.reset()
+        data = self.data
+        data.qpos[self._lift.qposadr] = self.arm_spec.height
+        data.act[0] = self.arm_spec.height
+        parked = next(kind for kind in OBJECTS if kind != self.object)
+        self._place(parked, np.array(_PARKED), 0.0)
+        self._place(self.object, setup["object_position"], setup["object_yaw"])
+        data.mocap_pos[self._cup] = [*setup["cup_position"], 0.0]
+        mujoco.mj_forward(self.model, data)
+        self._in_cup = 0
+        return self._observe(), {"object": self.object, **self._info()}
+
+    def _setup(self, options: Mapping[str, Any]) -> dict[str, Any]:
+        """Draws what the options leave open. All draws are made, so that options shift none."""
+        random, reach = self.np_random, self.object_range
+        kind = list(OBJECTS)[int(random.integers(len(OBJECTS)))]
+        position = random.uniform(-reach, reach, 2)
+        yaw = random.uniform(*self.yaw_range)
+        angle = np.pi + random.uniform(-self.cup_angle, self.cup_angle)
+        distance = random.uniform(*self.cup_range)
+        drawn = {
+            "object": kind,
+            "object_position": position,
+            "object_yaw": yaw,
+            "cup_position": distance * np.array([np.cos(angle), np.sin(angle)]),
+        }
+        unknown = sorted(set(options) - set(drawn))
+        if unknown:
+            raise ValueError(f"options must be some of {sorted(drawn)}, got {unknown}")
+        setup = drawn | dict(options)
+        if setup["object"] not in OBJECTS:
+            raise ValueError(f"object must be one of {sorted(OBJECTS)}, got {setup['object']!r}")
+        for key in ("object_position", "cup_position"):
+            value = np.asarray(setup[key], dtype=np.float64)
+            if value.shape != (2,) or not np.isfinite(value).all():
+                raise ValueError(f"{key} must be two finite numbers, got {setup[key]!r}")
+            setup[key] = value
+        if np.abs(setup["object_position"]).max() > reach + 1e-12:
+            raise ValueError(
+                f"object_position must be within {reach} m of 0 in x and y,"
+                f" got {setup['object_position']}"
+            )
+        low, high = self.yaw_range
+        if not low <= float(setup["object_yaw"]) <= high:
+            raise ValueError(
+                f"object_yaw must be between {low:.4f} and {high:.4f} rad, got {setup['object_yaw']}"
+            )
+        distance = float(np.hypot(*setup["cup_position"]))
+        if not self.cup_range[0] - 1e-9 <= distance <= self.cup_range[1] + 1e-9:
+            raise ValueError(
+                f"cup_position must be {self.cup_range} m from 0, got {setup['cup_position']}"
+                f" at {distance:.4f} m"
+            )
+        return setup
+
+    def _place(self, kind: str, position: ArrayLike, yaw: float) -> None:
+        """Puts an object onto its stand and both where they belong."""
+        pose = np.array([*np.asarray(position), _STAND])
+        turn = np.array([np.cos(yaw / 2.0), 0.0, 0.0, np.sin(yaw / 2.0)])
+        self.data.mocap_pos[self._stand[kind]] = pose
+        self.data.mocap_quat[self._stand[kind]] = turn
+        start = int(self._free[kind].qposadr[0])
+        self.data.qpos[start : start + 7] = [*pose, *turn]
+
+    def step(self, action: Action) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
+        """Heats and moves for ``control_period``; see the class.
+
+        Raises:
+            ValueError: If the action has the wrong shape, is not finite or out of [-1, 1].
+        """
+        command = np.asarray(action, dtype=np.float64)
+        if command.shape != (ACTION.size,):
+            raise ValueError(f"action must have shape ({ACTION.size},), got {command.shape}")
+        if not (np.isfinite(command).all() and np.abs(command).max() <= 1.0 + 1e-6):
+            raise ValueError(f"action must be finite and within -1 and 1, got {command}")
+        command = np.clip(command, -1.0, 1.0)
+        power = self.max_power * (command[:5] + 1.0) / 2.0
+        self.data.ctrl[0] = self.arm_spec.speed * command[5]
+        reason = None
+        try:
+            self.sim.step(power, self.control_period)
+        except SimulationDiverged as error:
+            reason = f"diverged: {error}"
+        observation = self._observe()
+        outside = OBSERVATION.outside(observation)
+        if outside:
+            reason = reason or f"diverged: {', '.join(outside)} out of bounds"
+            observation = self._bounded(observation)
+        reason = reason or self._damage()
+
+        terms, rests = self._reward(observation, float(np.sum(power)) * self.control_period)
+        self._in_cup = self._in_cup + 1 if rests else 0
+        success = self._in_cup >= 3 and reason is None
+        terms["place"] = 20.0 if success else 0.0
+        lost = bool(np.hypot(*self._position()[:2]) > 0.2)
+        info = {"reward_terms": terms, "success": success, "object": self.object, **self._info()}
+        if reason is not None:
+            info["truncation_reason"] = reason
+        if lost and not success:
+            info["termination_reason"] = "object out of reach"
+        return (
+            observation,
+            float(sum(terms.values())),
+            success or (lost and reason is None),
+            reason is not None,
+            info,
+        )
+
+    def _position(self) -> NDArray[np.float64]:
+        return self.data.xpos[self._body[self.object]]
+
+    def _observe(self) -> Observation:
+        data, sim = self.data, self.sim
+        tips = data.site_xpos[self._tips]
+        turn = np.empty(4)
+        mujoco.mju_mat2Quat(turn, data.site_xmat[self._grasp])
+        dofs = int(self._free[self.object].dofadr[0])
+        object_turn = data.xquat[self._body[self.object]]
+        return OBSERVATION.pack(
+            {
+                "base height": data.qpos[self._lift.qposadr],
+                "base velocity": data.qvel[self._lift.dofadr],
+                "TCA temperature": sim.temperature,
+                "TCA length": sim.length,
+                "TCA tension": sim.tension,
+                "gripper opening": np.linalg.norm(tips[1] - tips[0]),
+                "gripper position": data.site_xpos[self._grasp],
+                "gripper orientation": turn if turn[0] >= 0.0 else -turn,
+                "object width": OBJECTS[self.object],
+                "object position": self._position(),
+                "object orientation": object_turn if object_turn[0] >= 0.0 else -object_turn,
+                "object velocity": data.qvel[dofs : dofs + 3],
+                "object angular velocity": data.qvel[dofs + 3 : dofs + 6],
+                "cup position": data.mocap_pos[self._cup],
+            }
+        )
+
+    def _bounded(self, observation: Observation) -> Observation:
+        """The last observation of a diverged episode, brought back into the space."""
+        space = self.observation_space
+        low, high = space.low, space.high  # type: ignore[attr-defined]
+        return np.clip(np.nan_to_num(observation), low, high).astype(np.float32)
+
+    def _damage(self) -> str | None:
+        """Why a TCA does not survive, or None."""
+        sim = self.sim
+        for i, name in enumerate(sim.tca_names):
+            if sim.temperature[i] > self.max_temperature:
+                return f"overheated: {name} above {self.max_temperature} °C"
+            if sim.tension[i] > sim.bank.breaking_force[i]:
+                return f"torn: {name} above {sim.bank.breaking_force[i]} N"
+        return None
+
+    def _reward(self, observation: Observation, energy: float) -> tuple[dict[str, float], bool]:
+        """The terms of the reward, and whether the object lies still in the cup."""
+        seen = OBSERVATION.read(observation.astype(np.float64))
+        position, cup = seen["object position"], seen["cup position"]
+        aside = float(np.hypot(*(position - cup)[:2]))
+        inside = aside < _CUP_RADIUS and position[2] < _CUP_RIM
+        rests = inside and np.linalg.norm(seen["object velocity"]) < 0.02 and not self._touched()
+        gap = float(np.linalg.norm(position - seen["gripper position"]))
+        lifted = bool(position[2] > _STAND + 3e-3)
+        near = float(rewards.tolerance(gap, bounds=(0.0, 4e-3), margin=0.05))
+        over = float(rewards.tolerance(aside, bounds=(0.0, 8e-3), margin=0.03))
+        return {
+            "reach": 0.1 if inside else 0.1 * near,
+            "carry": 0.4 if inside else 0.4 * over * lifted,
+            "energy": -0.002 * energy,
+        }, rests
+
+    def _touched(self) -> bool:
+        """Whether the arm touches the object."""
+        pairs = self.data.contact.geom
+        if len(pairs) == 0:
+            return False
+        bodies = self.model.geom_bodyid[pairs]
+        mine = (bodies == self._body[self.object]).any(axis=1)
+        return bool((mine & self._is_arm[pairs].any(axis=1)).any())
+
+    def _info(self) -> dict[str, Any]:
+        sim = self.sim
+        return {
+            "time": sim.time,
+            "energy": sim.energy.copy(),
+            "temperature": sim.temperature.copy(),
+            "tension": sim.tension.copy(),
+        }
+
+    def render(self) -> NDArray[np.uint8] | None:  # type: ignore[override]
+        """A picture of the scene, shape (height, width, 3), or None without a render mode.
+
+        Raises:
+            RenderingUnavailable: If there is no OpenGL.
+        """
+        if self.render_mode is None:
+            return None
+        if self._screen is None:
+            width, height = self._size
+            self._screen = Offscreen(self.model, width=width, height=height, camera=self._camera)
+        colour_tendons(self.model, self.sim.tendon, self.sim.temperature)
+        return self._screen.draw(self.data)
+
+    def close(self) -> None:
+        """Frees what rendering took."""
+        if self._screen is not None:
+            self._screen.close()
+            self._screen = None

@@ -1,0 +1,92 @@
+"""Spaces as tables: every entry of an observation or action with its name, bounds and unit."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from gymnasium.spaces import Box
+from numpy.typing import ArrayLike, NDArray
+
+
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """A row of a table.
+
+    Attributes:
+        name: What it is.
+        size: How many numbers it takes.
+        low: Lower bound.
+        high: Upper bound.
+        unit: Unit, ``-`` for none.
+    """
+
+    name: str
+    size: int
+    low: float
+    high: float
+    unit: str
+
+
+class Table:
+    """Rows laid end to end in one flat array of float32.
+
+    Attributes:
+        entries: The rows.
+        slices: Where each row lies in the array.
+        size: Length of the array.
+    """
+
+    def __init__(self, entries: Sequence[Entry]) -> None:
+        self.entries = tuple(entries)
+        self.slices: dict[str, slice] = {}
+        start = 0
+        for entry in self.entries:
+            self.slices[entry.name] = slice(start, start + entry.size)
+            start += entry.size
+        self.size = start
+        self._low = np.repeat([e.low for e in self.entries], [e.size for e in self.entries])
+        self._high = np.repeat([e.high for e in self.entries], [e.size for e in self.entries])
+
+    @property
+    def space(self) -> Box:
+        """The table as a Gymnasium space."""
+        return Box(self._low.astype(np.float32), self._high.astype(np.float32), dtype=np.float32)
+
+    def pack(self, values: dict[str, ArrayLike]) -> NDArray[np.float32]:
+        """Lays the rows' values end to end.
+
+        Raises:
+            ValueError: If a row is missing, unknown or of the wrong size.
+        """
+        if values.keys() != self.slices.keys():
+            raise ValueError(f"values must be {sorted(self.slices)}, got {sorted(values)}")
+        out = np.empty(self.size, dtype=np.float32)
+        for entry in self.entries:
+            row = np.asarray(values[entry.name], dtype=np.float32)
+            if row.size != entry.size:
+                raise ValueError(f"{entry.name} must have {entry.size} numbers, got {row.size}")
+            out[self.slices[entry.name]] = row.reshape(-1)
+        return out
+
+    def read(self, array: NDArray[Any]) -> dict[str, NDArray[Any]]:
+        """The rows of an array of shape (..., size), by name."""
+        return {name: array[..., where] for name, where in self.slices.items()}
+
+    def outside(self, array: NDArray[Any]) -> list[str]:
+        """Names of the rows that are not finite or out of their bounds."""
+        low, high = self._low.astype(np.float32), self._high.astype(np.float32)
+        bad = ~(np.isfinite(array) & (array >= low) & (array <= high))
+        return [name for name, where in self.slices.items() if bad[where].any()]
+
+    def markdown(self) -> str:
+        """The table as Markdown, for the documentation."""
+        lines = ["| index | entry | low | high | unit |", "|---|---|---|---|---|"]
+        for entry in self.entries:
+            where = self.slices[entry.name]
+            last = where.stop - 1
+            index = f"{where.start}" if entry.size == 1 else f"{where.start}-{last}"
+            lines.append(
+                f"| {index} | {entry.name} | {entry.low:g} | {entry.high:g} | {entry.unit} |"
+            )
+        return "\n".join(lines)
