@@ -44,7 +44,7 @@ ACTION = Table([Entry("TCA power", 5, -1.0, 1.0, "-"), Entry("base velocity", 1,
 
 _STAND = 25e-3  # height of the objects' centres on their stands [m]
 _PARKED = (0.09, 0.08)  # where the object that is not used stands [m]
-_CUP_RADIUS, _CUP_RIM = 18e-3, 14e-3  # of assets/mjcf/cup.xml [m]
+_CUP_RADIUS, _CUP_RIM = 14e-3, 14e-3  # of assets/mjcf/cup.xml [m]
 
 
 class ArmPickPlace(gym.Env[Observation, Action]):
@@ -86,7 +86,7 @@ class ArmPickPlace(gym.Env[Observation, Action]):
     control_period = 0.1  # [s]
     object_range = 5e-3  # largest offset of the object in x and in y [m]
     yaw_range = (np.radians(120.0), np.radians(155.0))
-    cup_range = (26e-3, 32e-3)  # distance of the cup's axis from the arm's [m]
+    cup_range = (24e-3, 29e-3)  # distance of the cup's axis from the arm's [m]
     cup_angle = np.radians(20.0)  # of the cup's direction about -x
 
     def __init__(

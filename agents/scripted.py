@@ -1,0 +1,247 @@
+"""Scripted agents: feedback on what the robot senses, no replay.
+
+``PickAndPlace`` follows Sun, Section 4.1.4 and Fig. 5.6: align the wrist, open, lower, pinch,
+lift, turn back, bend towards the cup, release.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tca_mj.envs.arm import ACTION, OBSERVATION, ArmPickPlace
+from tca_mj.robots.arm import ArmSpec, arm
+from tca_mj.tca import TcaSpec
+
+PHASES = ("align", "open", "lower", "pinch", "lift", "turn back", "bend", "release", "done")
+
+_DT = ArmPickPlace.control_period
+_BENDING, _WRIST, _GRIPPER = slice(0, 3), 3, 4
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class PickAndPlaceGains:
+    """What the script was tuned to, on the default arm.
+
+    Attributes:
+        hottest: Temperature that no TCA is asked to pass [°C].
+        settling: Time in which a TCA is brought to a temperature [s].
+        bend_rate: Temperature asked for per offset of the gripper and second [K/(m s)].
+        bend_now: Temperature asked for per offset of the gripper [K/m].
+        taut: Tension that no bending TCA should fall below [N]. A slack TCA no longer holds the
+            soft body against twisting, and a strongly bent arm would roll over.
+        brace_rate: Temperature asked for per missing tension and second [K/(N s)].
+        wrist_slope: Rise of temperature that turns the wrist by one radian [K/rad].
+        opening_slope: Rise of temperature that opens the gripper by one metre [K/m].
+        clearance: Opening beyond the object's width [m].
+        aligned: Offset of the gripper with which it goes down [m].
+        aligned_yaw: Misalignment of the wrist with which it goes down [rad].
+        carry_height: Height of the object while it is carried [m].
+        drop_height: Height of the object when it is let go [m].
+    """
+
+    hottest: float = 165.0
+    settling: float = 0.6
+    bend_rate: float = 2000.0
+    bend_now: float = 1500.0
+    taut: float = 0.012
+    brace_rate: float = 2000.0
+    wrist_slope: float = 45.0
+    opening_slope: float = 5000.0
+    clearance: float = 8e-3
+    aligned: float = 1.0e-3
+    aligned_yaw: float = 0.07
+    carry_height: float = 45e-3
+    drop_height: float = 30e-3
+
+
+@dataclass(slots=True)
+class PickAndPlace:
+    """The scripted policy of ``TCA/ArmPickPlace-v0``: an observation in, an action out.
+
+    Attributes:
+        arm_spec: The arm it was told that it has.
+        gains: What it was tuned to.
+        phase: What it is doing, one of ``PHASES``.
+        since: Time in this phase [s].
+        tries: How often it went for the object.
+    """
+
+    arm_spec: ArmSpec = field(default_factory=ArmSpec)
+    gains: PickAndPlaceGains = field(default_factory=PickAndPlaceGains)
+    phase: str = "align"
+    since: float = 0.0
+    tries: int = 1
+    _bend: NDArray[np.float64] = field(default_factory=lambda: np.zeros(2))
+    _brace: NDArray[np.float64] = field(default_factory=lambda: np.zeros(3))
+    _calm: float = 0.0
+    _opening: float = 0.0
+    _height: float = 0.0
+    _heat: "_Heaters" = field(init=False)
+
+    def __post_init__(self) -> None:
+        self._heat = _Heaters([tca.spec for tca in arm(self.arm_spec).tcas])
+
+    def reset(self) -> None:
+        """Starts anew."""
+        self.phase, self.since, self.tries = "align", 0.0, 1
+        self._bend, self._brace = np.zeros(2), np.zeros(3)
+        self._calm = self._opening = self._height = 0.0
+
+    def act(self, observation: NDArray[np.float32]) -> NDArray[np.float32]:
+        """The action for the next control period, shape (6,)."""
+        seen = _Seen(observation)
+        self.since += _DT
+        self._calm = self._calm + _DT if abs(seen.opening - self._opening) < 2e-5 else 0.0
+        self._opening = seen.opening
+        following = self._next(seen)
+        if following != self.phase:
+            if following == "open" and self.phase in ("pinch", "lift"):
+                self.tries += 1
+            self.phase, self.since, self._calm = following, 0.0, 0.0
+            self._height = seen.object[2]
+        return self._command(seen)
+
+    def _next(self, seen: "_Seen") -> str:
+        """The phase after this one if its goal is reached, else the same."""
+        gains, late = self.gains, self.since > 40.0
+        offset = float(np.linalg.norm(seen.object[:2] - seen.gripper[:2]))
+        aligned = offset < gains.aligned and abs(seen.misaligned) < gains.aligned_yaw
+        match self.phase:
+            case "align" if aligned or late:
+                return "open"
+            case "open" if seen.opening > seen.width + 0.9 * gains.clearance or late:
+                return "lower"
+            case "lower" if abs(seen.gripper[2] - self._height) < 5e-4 or late:
+                return "pinch"
+            case "pinch" if (self._calm > 0.8 and seen.temperature[_GRIPPER] < 60.0) or late:
+                return "lift"
+            case "lift" if self.since > 1.0 and seen.object[2] < seen.gripper[2] - 8e-3:
+                return "open" if self.tries < 3 else "done"
+            case "lift" if seen.object[2] > gains.carry_height - 2e-3 or late:
+                return "turn back"
+            case "turn back" if abs(seen.yaw) < 0.2 or late:
+                return "bend"
+            case "bend" if (
+                float(np.linalg.norm(seen.object[:2] - seen.cup[:2])) < 5e-3
+                and seen.object[2] < gains.drop_height + 2e-3
+            ) or late:
+                return "release"
+            case "release" if seen.object[2] < 14e-3 or late:
+                return "done"
+        return self.phase
+
+    def _command(self, seen: "_Seen") -> NDArray[np.float32]:
+        gains, phase = self.gains, self.phase
+        target = np.full(5, -np.inf)  # wanted temperatures [°C]; below ambient means off
+
+        if phase in ("align", "open", "lower"):
+            target[_BENDING] = self._steer(seen, seen.object[:2] - seen.gripper[:2])
+            target[_WRIST] = seen.temperature[_WRIST] + 0.5 * gains.wrist_slope * seen.misaligned
+        elif phase in ("bend", "release", "done"):
+            held = phase != "bend"
+            error = np.zeros(2) if held else seen.cup[:2] - seen.object[:2]
+            target[_BENDING] = self._steer(seen, error)
+        elif phase == "pinch":
+            target[_BENDING] = self._steer(seen, np.zeros(2))
+            target[_WRIST] = seen.temperature[_WRIST]
+        else:
+            self._bend *= 0.9
+            target[_BENDING] = self._steer(seen, np.zeros(2))
+        if phase in ("open", "lower", "release"):
+            wanted = seen.width + gains.clearance * (1.5 if phase == "release" else 1.0)
+            target[_GRIPPER] = seen.temperature[_GRIPPER] + 0.3 * gains.opening_slope * (
+                wanted - seen.opening
+            )
+        power = self._heat.power(
+            seen.temperature, np.minimum(target, gains.hottest), gains.settling
+        )
+        action = np.empty(ACTION.size, dtype=np.float32)
+        action[:5] = np.clip(2.0 * power / ArmPickPlace.max_power - 1.0, -1.0, 1.0)
+        action[5] = np.clip(self._climb(seen) / self.arm_spec.speed, -1.0, 1.0)
+        return action
+
+    def _steer(
+        self, seen: "_Seen", error: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """Temperatures of the three bending TCAs that take the gripper along ``error`` [m].
+
+        Proportional and integral; a TCA bends the arm to its own side.
+        """
+        self._bend = self._bend + self.gains.bend_rate * _DT * error
+        wanted = self._bend + self.gains.bend_now * error
+        share = (2.0 / 3.0) * _SIDES @ wanted
+        share -= share.min()
+        excess = share.max() - (self.gains.hottest - 40.0)
+        if excess > 0.0:  # no wind-up against the hottest temperature
+            self._bend *= 1.0 - excess / share.max()
+            share *= 1.0 - excess / share.max()
+        missing = self.gains.taut - seen.tension[_BENDING]
+        self._brace = np.clip(self._brace + self.gains.brace_rate * _DT * missing, 0.0, 60.0)
+        return seen.ambient + self._brace + share
+
+    def _climb(self, seen: "_Seen") -> float:
+        """Velocity of the base [m/s]."""
+        match self.phase:
+            case "lower":
+                return 2.0 * (self._height - seen.gripper[2])
+            case "pinch":
+                return 0.0
+            case "lift" | "turn back":
+                return 2.0 * (self.gains.carry_height - seen.object[2])
+            case "bend" | "release":
+                aside = float(np.linalg.norm(seen.object[:2] - seen.cup[:2]))
+                near = aside < 8e-3 or self.phase == "release"
+                height = self.gains.drop_height if near else self.gains.carry_height
+                if self.phase == "release":
+                    return 0.0
+                return 2.0 * (height - seen.object[2])
+            case "done":
+                return 0.02
+            case _:
+                return 2.0 * (seen.object[2] + 20e-3 - seen.gripper[2])
+
+
+# Unit vectors in the world towards which the three TCAs bend the hanging arm: the module's x
+# axis is the world's, its y axis the world's negative one.
+_ANGLES = -2.0 * np.pi / 3.0 * np.arange(3)
+_SIDES = np.stack([np.cos(_ANGLES), np.sin(_ANGLES)], axis=-1)
+
+
+class _Heaters:
+    """Power that brings TCAs of known heat capacity and loss to wanted temperatures."""
+
+    def __init__(self, specs: Sequence[TcaSpec]) -> None:
+        self.capacity = np.array([spec.heat.capacity for spec in specs])
+        self.loss = np.array([spec.heat.loss for spec in specs])
+
+    def power(
+        self, temperature: NDArray[np.float64], wanted: NDArray[np.float64], settling: float
+    ) -> NDArray[np.float64]:
+        """Not negative, shape (n,) [W]; a wanted temperature of -inf is off."""
+        hold = self.loss * (np.minimum(temperature, wanted) - _Seen.ambient)
+        return np.maximum(hold + self.capacity * (wanted - temperature) / settling, 0.0)
+
+
+class _Seen:
+    """An observation, taken apart."""
+
+    ambient = 25.0
+
+    def __init__(self, observation: NDArray[np.float32]) -> None:
+        rows = OBSERVATION.read(observation.astype(np.float64))
+        self.temperature = rows["TCA temperature"]
+        self.tension = rows["TCA tension"]
+        self.opening = float(rows["gripper opening"][0])
+        self.width = float(rows["object width"][0])
+        self.gripper = rows["gripper position"]
+        self.object = rows["object position"]
+        self.cup = rows["cup position"]
+        # The fingers close along the gripper's x axis; neutral is the world's x axis.
+        w, x, y, z = rows["gripper orientation"]
+        self.yaw = float(np.arctan2(2.0 * (x * y + w * z), 1.0 - 2.0 * (y * y + z * z)))
+        w, x, y, z = rows["object orientation"]
+        long_side = float(np.arctan2(2.0 * (x * y + w * z), 1.0 - 2.0 * (y * y + z * z)))
+        # The long side has to lie across the fingers; half turns do not matter.
+        self.misaligned = (long_side - np.pi / 2.0 - self.yaw + np.pi / 2.0) % np.pi - np.pi / 2.0

@@ -1,0 +1,314 @@
+"""Tension of a helical TCA from Cosserat rod theory, in closed form but for one scalar.
+
+A uniform helix under an axial force F and an axial moment M that keeps both ends from turning
+has constant strains, so that the boundary value problem of the rod [Sun, dissertation, Colorado
+State University, eqs. (3.5)-(3.8)] collapses to four algebraic equations. With b the
+pitch of the fibre's sections, W = dphi/ds = cos(alpha*)/r* the fixed winding, r the radius and
+l the length of the coil over the length of the fibre:
+
+    EI (W cos b - kappa*)           = M cos b - F r sin b      kappa* = W cos(alpha*)
+    GJ (W sin b - tau* - untwist)   = M sin b + F r cos b      tau*   = W sin(alpha*)
+    GA (l cos b - r W sin b)        = F cos b
+    EA (r W cos b + l sin b - 1)    = F sin b
+
+The last two give r and l; eliminating M and r leaves, with s = sin b and D = 1/EA - 1/GA,
+
+    F + s D F^2 = q(s) := W ((GJ - EI) W s - GJ (tau* + untwist) + EI kappa* tan b)
+    l(s)        = s + F (1/GA + s^2 D),
+
+so F(s) is the root of a quadratic and l(s) = length/fibre_length is solved by Newton. Heat and
+load soften all four stiffnesses alike: s is found with the moduli of the reference temperature,
+and ``moduli.softened_tension`` turns that tension into the true one. Only +, -, *, / and
+square roots are used, and every element is solved by itself, so that a result depends on
+its own inputs alone, bit for bit, whatever batch it stands in.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from tca_mj.tca.moduli import FibreTable, radial_growth, softened_tension, softening, untwist
+from tca_mj.tca.spec import TcaSpec
+
+Array = NDArray[np.float64]
+
+# Newton's steps for every element. Ordinary lengths need three or four; what has not converged
+# goes on with a bracket around the root.
+_STEPS = 4
+_BRACKETED_STEPS = 200
+_TOLERANCE = 1e-13  # residual in length over fibre length
+_SHORTEST = 0.5  # of the minimum length: domain of the law
+_LONGEST = 0.98  # of the fibre length: domain of the law
+
+
+class CoilSolveError(ArithmeticError):
+    """The shape of a coil was not found.
+
+    Attributes:
+        residual: Largest error left in length/fibre_length [1].
+    """
+
+    def __init__(self, residual: float) -> None:
+        super().__init__(
+            f"coil not solved: length/fibre_length is off by {residual}, allowed {_TOLERANCE}"
+        )
+        self.residual = residual
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Helix:
+    """Solved state of the coil itself, without the contact of its turns; arrays (..., n).
+
+    Attributes:
+        pitch: Pitch b of the fibre's sections [rad].
+        radius: Radius r of the loaded coil [m].
+        tension: Axial force F, negative when pushed [N].
+        moment: Axial moment M that keeps the ends from turning [N m].
+        softening: Share e of the moduli left [1].
+    """
+
+    pitch: Array
+    radius: Array
+    tension: Array
+    moment: Array
+    softening: Array
+
+
+class _Section(NamedTuple):
+    """Constants of q(s) and l(s) at one temperature, arrays (..., n)."""
+
+    constant: Array  # q = constant + linear s + tangent tan b [N]
+    linear: Array
+    tangent: Array
+    shear: Array  # 1/GA [1/N]
+    excess: Array  # D = 1/EA - 1/GA [1/N]
+
+
+class CoilRods:
+    """The tension law of n TCAs of any specs, evaluated together.
+
+    Attributes:
+        n: Number of TCAs.
+        shortest: Lower end of the law's domain, half of the minimum length, shape (n,) [m].
+        longest: Upper end of the law's domain, 98 % of the fibre length, shape (n,) [m].
+        rest_stiffness: dF/dl of the cold coil at its natural length, shape (n,) [N/m].
+        contact_stiffness: Stiffness of the coils pressed together, shape (n,) [N/m].
+    """
+
+    def __init__(self, specs: Sequence[TcaSpec]) -> None:
+        fibres = [spec.fibre for spec in specs]
+        self.n = len(specs)
+        self._fibres = FibreTable.of(fibres)
+        self._hot = np.array([fibre.section == "hot" for fibre in fibres])
+        self._any_hot = bool(self._hot.any())
+
+        young = np.array([fibre.young for fibre in fibres])
+        shear = np.array([fibre.shear for fibre in fibres])
+        area = np.array([fibre.area for fibre in fibres])
+        second_moment = np.array([fibre.second_moment for fibre in fibres])
+        pitch = np.array([spec.pitch_angle for spec in specs])
+        self._bending = young * second_moment  # EI
+        self._torsion = shear * (2.0 * second_moment)  # GJ
+        self._winding = np.array([spec.winding for spec in specs])
+        self._curvature = self._winding * np.cos(pitch)
+        self._twist = self._winding * np.sin(pitch)
+        self._fibre_length = np.array([spec.fibre_length for spec in specs])
+        # Sun, Section 3.2.2 with the fibre's radius: 171 rad/m at 60 g on the free-stroke TCA.
+        radius = np.array([fibre.radius for fibre in fibres])
+        self._torsion_per_tension = radius * np.cos(pitch) / self._torsion
+
+        self._untwisting = self._winding * self._torsion
+        self._linear = self._winding * self._winding * (self._torsion - self._bending)
+        self._tangent = self._winding * self._bending * self._curvature
+        self._shear = 1.0 / (shear * area)
+        self._excess = 1.0 / (young * area) - self._shear
+
+        coil_radius = np.array([spec.coil_radius for spec in specs])
+        sin, cos = np.sin(pitch), np.cos(pitch)
+        compliance = coil_radius**2 / (self._torsion * cos**2 + self._bending * sin**2)
+        compliance += self._shear + sin**2 * self._excess
+        self.rest_stiffness = 1.0 / (self._fibre_length * compliance)
+        ratio = np.array([spec.contact_ratio for spec in specs])
+        self.contact_stiffness = ratio * self.rest_stiffness
+        self._minimum = np.array([spec.minimum_length for spec in specs])
+        self._onset = np.array([spec.contact_smoothing for spec in specs]) * self._minimum
+        self.shortest = _SHORTEST * self._minimum
+        self.longest = _LONGEST * self._fibre_length
+        for array in vars(self).values():
+            if isinstance(array, np.ndarray):
+                array.setflags(write=False)
+
+    def tension(self, length: ArrayLike, temperature: ArrayLike) -> tuple[Array, Array]:
+        """Tension of the coils at given lengths and temperatures, and its slope.
+
+        Args:
+            length: Length of the TCA, shape (..., n) [m].
+            temperature: Temperature, same shape [°C].
+
+        Returns:
+            Tension F, negative when the coil is pushed [N], and stiffness dF/dl [N/m].
+
+        Raises:
+            ValueError: If a length is outside ``shortest`` to ``longest``, or a temperature
+                leaves no modulus, or either is not a number.
+            CoilSolveError: If the shape is not found.
+        """
+        length, temperature = self._checked(length, temperature)
+        _, stiff, slope = self._solve(length, temperature)
+        tension, share = softened_tension(
+            self._fibres, temperature, stiff, self._torsion_per_tension
+        )
+        contact, contact_slope = self._contact(length)
+        return tension - contact, share * slope + contact_slope
+
+    def helix(self, length: ArrayLike, temperature: ArrayLike) -> Helix:
+        """Shape and loads of the coils, contact left out; arguments and errors as ``tension``."""
+        length, temperature = self._checked(length, temperature)
+        sin, stiff, _ = self._solve(length, temperature)
+        tension, _ = softened_tension(self._fibres, temperature, stiff, self._torsion_per_tension)
+        # Not F/f, which is 0/0 for a coil at rest.
+        share = softening(self._fibres, temperature, self._torsion_per_tension * tension)
+        cos = np.sqrt(1.0 - sin * sin)
+        section = self._section(temperature)
+        radius = (cos + stiff * sin * cos * section.excess) / self._winding
+        growth4 = section.tangent / self._tangent
+        bent = growth4 * self._bending * (self._winding * cos - self._curvature)
+        twist = self._twist + untwist(self._fibres, temperature)
+        twisted = growth4 * self._torsion * (self._winding * sin - twist)
+        return Helix(
+            pitch=np.arcsin(sin),
+            radius=radius,
+            tension=tension,
+            moment=share * (bent * cos + twisted * sin),
+            softening=share,
+        )
+
+    def _checked(self, length: ArrayLike, temperature: ArrayLike) -> tuple[Array, Array]:
+        length = np.asarray(length, dtype=np.float64)
+        temperature = np.asarray(temperature, dtype=np.float64)
+        for name, array in (("length", length), ("temperature", temperature)):
+            if array.ndim == 0 or array.shape[-1] != self.n or array.shape != length.shape:
+                raise ValueError(
+                    f"{name} has shape {array.shape}; it must be (..., {self.n}) "
+                    f"and equal that of length, {length.shape}"
+                )
+        inside = (length >= self.shortest) & (length <= self.longest)
+        if not inside.all():
+            worst = tuple(int(i) for i in np.argwhere(~inside)[0])
+            raise ValueError(
+                f"length{list(worst)} = {length[worst]} m must lie between "
+                f"{self.shortest[worst[-1]]} m (half of the minimum length) and "
+                f"{self.longest[worst[-1]]} m (98 % of the fibre length)"
+            )
+        if not ((temperature > -273.15) & (temperature < np.inf)).all():
+            raise ValueError(f"temperature = {temperature} °C must be finite and above -273.15")
+        return length, temperature
+
+    def _section(self, temperature: Array) -> _Section:
+        """Constants of the scalar law at the moduli of the reference temperature."""
+        bias = -self._untwisting * (self._twist + untwist(self._fibres, temperature))
+        if not self._any_hot:
+            return _Section(bias, self._linear, self._tangent, self._shear, self._excess)
+        growth2 = np.square(1.0 + radial_growth(self._fibres, temperature))
+        growth2 = np.where(self._hot, growth2, 1.0)
+        growth4 = growth2 * growth2
+        return _Section(
+            bias * growth4,
+            self._linear * growth4,
+            self._tangent * growth4,
+            self._shear / growth2,
+            self._excess / growth2,
+        )
+
+    def _solve(self, length: Array, temperature: Array) -> tuple[Array, Array, Array]:
+        """sin b, tension and its slope over length [N/m], at the moduli of reference."""
+        target = length / self._fibre_length
+        section = self._section(temperature)
+        sin = target
+        with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
+            for _ in range(_STEPS):
+                _, _, ratio, ratio_slope = _law(sin, section)
+                sin = sin - (ratio - target) / ratio_slope
+            stiff, slope, ratio, ratio_slope = _law(sin, section)
+            residual = np.abs(ratio - target)
+            if not (residual <= _TOLERANCE).all():
+                sin = _repaired(sin, ~(residual <= _TOLERANCE), target, section)
+                stiff, slope, ratio, ratio_slope = _law(sin, section)
+        return sin, stiff, slope / (ratio_slope * self._fibre_length)
+
+    def _contact(self, length: Array) -> tuple[Array, Array]:
+        """Push of touching coils and -d/dl of it: zero, then a parabola, then a line."""
+        depth = self._minimum - length
+        onset = np.minimum(np.maximum(depth, 0.0), self._onset)
+        beyond = np.maximum(depth - self._onset, 0.0)
+        share = onset / self._onset
+        stiffness = self.contact_stiffness
+        return stiffness * (0.5 * onset * share + beyond), stiffness * share
+
+
+def coil_tension(spec: TcaSpec, length: ArrayLike, temperature: ArrayLike) -> tuple[Array, Array]:
+    """Tension of one TCA, both ends glued, and its slope.
+
+    Args:
+        spec: The TCA.
+        length: Length between its ends, any shape, broadcast with ``temperature`` [m].
+        temperature: Temperature, any shape [°C].
+
+    Returns:
+        Tension F, not clipped: negative when the coil is pushed [N], and stiffness dF/dl [N/m].
+
+    Raises:
+        ValueError: If a length is outside half of the minimum length to 98 % of the fibre length,
+            or a temperature leaves no modulus.
+        CoilSolveError: If the shape is not found.
+    """
+    length, temperature = np.broadcast_arrays(
+        np.asarray(length, dtype=np.float64), np.asarray(temperature, dtype=np.float64)
+    )
+    tension, stiffness = CoilRods([spec]).tension(length[..., None], temperature[..., None])
+    return tension[..., 0], stiffness[..., 0]
+
+
+def _law(sin: Array, section: _Section) -> tuple[Array, Array, Array, Array]:
+    """F, dF/ds, l and dl/ds at s = sin b; NaN where no such state exists."""
+    constant, linear, tangent, shear, excess = section
+    cos2 = 1.0 - sin * sin
+    cos = np.sqrt(cos2)
+    pull = constant + linear * sin + tangent * (sin / cos)
+    pull_slope = linear + tangent / (cos2 * cos)
+    skew = sin * excess
+    root = np.sqrt(1.0 + 4.0 * (skew * pull))
+    force = 2.0 * pull / (1.0 + root)
+    slope = (pull_slope - excess * (force * force)) / root
+    give = shear + sin * skew
+    return force, slope, sin + force * give, 1.0 + slope * give + 2.0 * (force * skew)
+
+
+def _repaired(sin: Array, wrong: NDArray[np.bool_], target: Array, section: _Section) -> Array:
+    """Solves the elements marked ``wrong`` by Newton's method inside a shrinking bracket."""
+    part = _Section(*(np.broadcast_to(field, target.shape)[wrong] for field in section))
+    goal = target[wrong]
+    low, high = np.zeros_like(goal), np.ones_like(goal)
+    point = 0.5 * (low + high)
+    residual = np.full_like(goal, np.inf)
+    for _ in range(_BRACKETED_STEPS):
+        _, _, ratio, ratio_slope = _law(point, part)
+        residual = np.abs(ratio - goal)
+        open_ = ~(residual <= _TOLERANCE)
+        if not open_.any():
+            break
+        # Where no state exists (NaN) the coil is stretched beyond its shear: go shorter.
+        short = ratio < goal
+        low, high = np.where(short, point, low), np.where(short, high, point)
+        newton = point - (ratio - goal) / ratio_slope
+        middle = 0.5 * (low + high)
+        newton = np.where((newton > low) & (newton < high), newton, middle)
+        point = np.where(open_, newton, point)
+    else:
+        raise CoilSolveError(float(np.nan_to_num(residual, nan=np.inf).max()))
+    repaired = sin.copy()
+    repaired[wrong] = point
+    return repaired

@@ -1,0 +1,162 @@
+"""How temperature and load change a twisted fibre: growth, untwist and softening.
+
+Every function takes one ``FibreSpec``, or a ``FibreTable`` of n fibres whose temperatures
+stand on the last axis.
+"""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from tca_mj.tca.spec import FibreSpec
+
+Array = NDArray[np.float64]
+
+
+class FibreTable(NamedTuple):
+    """What the laws of this file need of n fibres, each field an array of shape (n,).
+
+    Field by field this is the ``FibreSpec`` attribute of the same name.
+    """
+
+    reference_temperature: Array
+    inserted_twist: Array
+    untwist_scale: Array
+    growth: tuple[Array, Array]
+    softening_rate: Array
+    load_softening: tuple[Array, Array, Array]
+
+    @classmethod
+    def of(cls, fibres: Sequence[FibreSpec]) -> "FibreTable":
+        """Collects the numbers of ``fibres``, in their order."""
+        a2, a1 = np.array([fibre.growth for fibre in fibres]).T.copy()
+        mu2, mu1, mu0 = np.array([fibre.load_softening for fibre in fibres]).T.copy()
+        return cls(
+            reference_temperature=np.array([fibre.reference_temperature for fibre in fibres]),
+            inserted_twist=np.array([fibre.inserted_twist for fibre in fibres]),
+            untwist_scale=np.array([fibre.untwist_scale for fibre in fibres]),
+            growth=(a2, a1),
+            softening_rate=np.array([fibre.softening_rate for fibre in fibres]),
+            load_softening=(mu2, mu1, mu0),
+        )
+
+
+Fibres = FibreSpec | FibreTable
+
+
+def radial_growth(fibre: Fibres, temperature: ArrayLike) -> Array:
+    """Relative growth of the fibre's radius, Gamma(T)/Gamma(T_0) - 1.
+
+    Sun, dissertation, Colorado State University, eq. (3.2), divided by its value at the
+    reference temperature: there the growth is exactly zero.
+
+    Args:
+        fibre: One fibre or a table of n.
+        temperature: Temperature, shape (...) or (..., n) [°C].
+
+    Returns:
+        Growth, same shape [1].
+    """
+    rise = np.asarray(temperature, dtype=np.float64) - fibre.reference_temperature
+    a2, a1 = fibre.growth
+    return rise * (a1 + a2 * rise)
+
+
+def untwist(fibre: Fibres, temperature: ArrayLike) -> Array:
+    """Twist lost by heating, inserted_twist (1/Gamma - 1), Sun, eq. (3.4).
+
+    Args:
+        fibre: One fibre or a table of n.
+        temperature: Temperature, shape (...) or (..., n) [°C].
+
+    Returns:
+        Untwist per fibre length, negative when hot, same shape [rad/m].
+
+    Raises:
+        ValueError: If the fibre would shrink to nothing (far outside the fitted range).
+    """
+    temperature = np.asarray(temperature, dtype=np.float64)
+    growth = radial_growth(fibre, temperature)
+    if not (growth > -1.0).all():
+        raise ValueError(f"temperature = {temperature} °C leaves the fibre no radius")
+    twist = fibre.inserted_twist * fibre.untwist_scale
+    return -twist * (growth / (1.0 + growth))
+
+
+def softening(fibre: Fibres, temperature: ArrayLike, torsion: ArrayLike = 0.0) -> Array:
+    """Share e of the moduli that is left, E_f/E_f0 of Sun, eq. (3.11).
+
+    It multiplies both E and G as measured at the reference temperature: yarn mechanics
+    [Sun, eqs. (3.9), (3.10)] makes both proportional to the filament's E_f. The load counts only
+    where it was measured: on a pulled (torsion >= 0) and warm (T >= T_0) fibre; elsewhere the
+    polynomial keeps its value at zero torsion.
+
+    Args:
+        fibre: One fibre or a table of n.
+        temperature: Temperature, shape (...) or (..., n) [°C].
+        torsion: Torsion tau that the load causes at the cold shear modulus [rad/m].
+
+    Returns:
+        Share e, 1 at the reference temperature.
+
+    Raises:
+        ValueError: If nothing is left, E_f <= 0: beyond the range of the polynomial.
+    """
+    temperature = np.asarray(temperature, dtype=np.float64)
+    rise = temperature - fibre.reference_temperature
+    fall = fibre.softening_rate * rise
+    mu2, mu1, mu0 = fibre.load_softening
+    torsion = np.maximum(np.asarray(torsion, dtype=np.float64), 0.0)
+    left = 1.0 - fall * mu0 - np.maximum(fall, 0.0) * (torsion * (mu1 + mu2 * torsion))
+    _require_modulus(left, temperature)
+    return left
+
+
+def softened_tension(
+    fibre: Fibres, temperature: ArrayLike, stiff: ArrayLike, torsion_per_tension: ArrayLike
+) -> tuple[Array, Array]:
+    """Tension F of a coil whose tension at the cold moduli would be f: solves F = f e(T, F).
+
+    All section stiffnesses soften alike, so the shape of the coil does not depend on e and
+    its tension is proportional to it. With the torsion proportional to F, e is quadratic in F:
+
+        f k mu2 c^2 F^2 + (1 + f k mu1 c) F - f (1 - k mu0) = 0,   k = softening_rate (T - T_0).
+
+    Its root F >= 0 exists for every f >= 0 as long as 1 - k mu0 > 0. A pushed coil (f < 0)
+    takes the moduli at zero torsion; the law and its slope are continuous there.
+
+    Args:
+        fibre: One fibre or a table of n.
+        temperature: Temperature, shape (...) or (..., n) [°C].
+        stiff: Tension f at the moduli of the reference temperature, broadcast [N].
+        torsion_per_tension: Ratio c = tau/F [rad/(m N)].
+
+    Returns:
+        Tension F [N] and its slope dF/df [1].
+
+    Raises:
+        ValueError: If the heat alone leaves no modulus.
+    """
+    temperature = np.asarray(temperature, dtype=np.float64)
+    rise = temperature - fibre.reference_temperature
+    stiff = np.asarray(stiff, dtype=np.float64)
+    mu2, mu1, mu0 = fibre.load_softening
+    fall = fibre.softening_rate * rise
+    unloaded = 1.0 - fall * mu0
+    _require_modulus(unloaded, temperature)
+    # Zero for a pushed or a cold coil, which leaves F = f (1 - k mu0).
+    load = np.maximum(stiff, 0.0) * np.maximum(fall, 0.0) * torsion_per_tension
+    linear = 1.0 + load * mu1
+    root = np.sqrt(linear * linear + 4.0 * (load * mu2) * torsion_per_tension * stiff * unloaded)
+    left = 2.0 * unloaded / (linear + root)
+    return stiff * left, left / root
+
+
+def _require_modulus(left: Array, temperature: Array) -> None:
+    if not (left > 0.0).all():
+        raise ValueError(
+            f"temperature = {temperature} °C leaves a modulus E_f/E_f0 of {np.min(left)}; "
+            "it must be above 0"
+        )

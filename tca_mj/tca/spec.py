@@ -1,0 +1,317 @@
+"""What a twisted-and-coiled actuator (TCA) is made of, and the TCAs that have been published.
+
+"Sun" below is J. Sun's dissertation, Colorado State University; its Chapter 2 and its
+Chapter 3 describe threads of the same kind that differ in radius and inserted twist, so
+they are two fibres here.
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from types import MappingProxyType
+from typing import Literal
+
+from tca_mj.tca.thermal import HeatSpec
+
+_ABSOLUTE_ZERO = -273.15  # [°C]
+
+
+def _require(name: str, value: float, *, above: float, below: float = math.inf) -> None:
+    if not above < value < below:
+        raise ValueError(f"{name} = {value} must lie strictly between {above} and {below}")
+
+
+def _require_not_negative(name: str, value: float) -> None:
+    if not 0.0 <= value < math.inf:
+        raise ValueError(f"{name} = {value} must be finite and not below 0")
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class FibreSpec:
+    """The twisted fibre (thread) of a TCA. Defaults: Sun, Tables 3.1 and Section 3.2.2.
+
+    Attributes:
+        radius: Radius r_t of the twisted fibre when cold [m].
+        young: Measured longitudinal Young's modulus E at the reference temperature [Pa].
+        shear: Measured longitudinal shear modulus G at the reference temperature [Pa].
+        filament_young: Young's modulus E_f0 of the filament, nylon 6,6 [Pa].
+        softening: Fall of E_f per kelvin, Sun, eq. (3.11) [Pa/K].
+        load_softening: Coefficients (mu2, mu1, mu0) of the polynomial lambda(tau) by which
+            a torsion tau [rad/m] multiplies that fall, Sun, eq. (3.11). (0, 0, 1) is no
+            influence of the load. The other published set, (3.24e-4, -0.027, 1), was
+            fitted to three loads of the free-stroke TCA up to 60 g (tau = 171 rad/m) and is
+            an extrapolation beyond.
+        inserted_twist: Twist inserted before annealing, per fibre length [rad/m].
+        untwist_scale: Factor on the untwist, 1 unless a coil was fitted with another.
+        expansion: Coefficients (c2, c1, c0) of the ratio of hot to cold fibre radius,
+            Gamma(T) = c2 T^2 + c1 T + c0 with T in °C, Sun, Section 3.1.2. The constant term
+            is the one near 1. The laws divide Gamma by its value at the
+            reference temperature, so that a cold TCA is at rest.
+        density: Mass per volume of the fibre [kg/m^3].
+        specific_heat: Heat capacity per mass [J/(kg K)].
+        reference_temperature: Temperature T_0 at which the TCA has its natural shape [°C].
+        temperature_range: Lowest and highest temperature of the measurements behind
+            ``expansion`` and ``softening`` [°C]; the laws extrapolate beyond it.
+        section: Whether A, I and J belong to the cold radius or grow with Gamma. An open
+            choice, not settled by the source: "cold" is an assumption.
+    """
+
+    radius: float = 0.21e-3
+    young: float = 1.2e9
+    shear: float = 0.22e9
+    filament_young: float = 3.9e9
+    softening: float = 0.0011e9
+    load_softening: tuple[float, float, float] = (0.0, 0.0, 1.0)
+    inserted_twist: float = 4710.0
+    untwist_scale: float = 1.0
+    expansion: tuple[float, float, float] = (3.5e-6, -6.7e-5, 1.0)
+    density: float = 1300.0
+    specific_heat: float = 1267.0
+    reference_temperature: float = 25.0
+    temperature_range: tuple[float, float] = (25.0, 160.0)
+    section: Literal["cold", "hot"] = "cold"
+
+    def __post_init__(self) -> None:
+        for name in ("radius", "young", "shear", "filament_young", "density", "specific_heat"):
+            _require(name, getattr(self, name), above=0.0)
+        for name in ("softening", "inserted_twist", "untwist_scale"):
+            _require_not_negative(name, getattr(self, name))
+        _require("reference_temperature", self.reference_temperature, above=_ABSOLUTE_ZERO)
+        if self.section not in ("cold", "hot"):
+            raise ValueError(f"section = {self.section!r} must be 'cold' or 'hot'")
+        self._check_polynomials()
+
+    def _check_polynomials(self) -> None:
+        for name in ("load_softening", "expansion", "temperature_range"):
+            values = getattr(self, name)
+            if len(values) != (2 if name == "temperature_range" else 3) or not all(
+                math.isfinite(value) for value in values
+            ):
+                raise ValueError(f"{name} = {values} must hold 3 (a range: 2) finite numbers")
+        low, high = self.temperature_range
+        if not _ABSOLUTE_ZERO < low <= self.reference_temperature < high:
+            raise ValueError(
+                f"temperature_range = {self.temperature_range} must be above {_ABSOLUTE_ZERO} and "
+                f"hold the reference_temperature {self.reference_temperature} below its upper end"
+            )
+        mu2, mu1, mu0 = self.load_softening
+        if not (mu2 >= 0.0 and mu0 > 0.0 and (mu1 >= 0.0 or mu1 * mu1 < 4.0 * mu2 * mu0)):
+            raise ValueError(
+                f"load_softening = {self.load_softening} must be positive for every torsion >= 0"
+            )
+        bound = self.filament_young / (high - self.reference_temperature) / mu0
+        if not self.softening < bound:
+            raise ValueError(
+                f"softening = {self.softening} must be below {bound}: no modulus left at {high} °C"
+            )
+        c2, c1, c0 = self.expansion
+        checked = [low, high, self.reference_temperature]
+        if c2 != 0.0 and low < -c1 / (2.0 * c2) < high:
+            checked.append(-c1 / (2.0 * c2))
+        if not all(c2 * t * t + c1 * t + c0 > 0.0 for t in checked):
+            raise ValueError(
+                f"expansion = {self.expansion} must be above 0 from {low} to {high} °C"
+            )
+
+    @property
+    def growth(self) -> tuple[float, float]:
+        """(a2, a1) of Gamma(T)/Gamma(T_0) = 1 + a1 (T - T_0) + a2 (T - T_0)^2 [1/K^2, 1/K]."""
+        c2, c1, c0 = self.expansion
+        t0 = self.reference_temperature
+        gamma0 = c2 * t0 * t0 + c1 * t0 + c0
+        return c2 / gamma0, (c1 + 2.0 * c2 * t0) / gamma0
+
+    @property
+    def softening_rate(self) -> float:
+        """Relative fall of both moduli per kelvin without load [1/K]."""
+        return self.softening / self.filament_young
+
+    @property
+    def area(self) -> float:
+        """Cross-section A when cold [m^2]."""
+        return math.pi * self.radius**2
+
+    @property
+    def second_moment(self) -> float:
+        """Second moment of area I when cold [m^4]; the polar moment J is twice as large."""
+        return math.pi * self.radius**4 / 4.0
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class TcaSpec:
+    """One TCA: a fibre wound to a helix, and its heat and resistance.
+
+    Attributes:
+        fibre: The twisted fibre.
+        fibre_length: Length l_t of the twisted fibre in the coil [m].
+        coil_radius: Radius r* of the fibre's centre line at the natural length [m].
+        pitch_angle: Pitch angle alpha* at the natural length [rad].
+        minimum_pitch_angle: Pitch angle at which neighbouring coils touch [rad].
+        breaking_force: Tension at which the TCA breaks, Sun, Section 2.1.1, type 2-200 [N].
+        resistance_per_length: Electrical resistance per *natural length* of the TCA (not per
+            fibre length), Sun, Table 2.3: 6.7 ohm/dm [ohm/m].
+        resistance_strain: Relative fall of the resistance per unit strain. Sun, Section 2.3.1:
+            0.55 ohm for 50 % on a TCA of 110 mm, which has 7.37 ohm: 0.55/7.37/0.5.
+        convection: Heat transfer coefficient h to still air, Sun, Table 3.1 [W/(m^2 K)].
+        roughness: Factor c_s of the fibre's true surface over 2 pi r_t l_t, Sun, Section 3.1.1.
+        ambient: Temperature of the surroundings [°C].
+        sheath_capacity: Heat capacity of a sheath or tube heated with the TCA [J/K].
+        sheath_area: Surface through which a sheathed TCA loses its heat, in place of the
+            fibre's own; None for a bare TCA [m^2].
+        contact_ratio: Stiffness of touching coils over that of the cold coil: an estimate.
+        contact_smoothing: Range over which the contact sets in, as a share of the minimum
+            length: an estimate.
+    """
+
+    fibre: FibreSpec
+    fibre_length: float
+    coil_radius: float
+    pitch_angle: float
+    minimum_pitch_angle: float
+    breaking_force: float = 0.78
+    resistance_per_length: float = 67.0
+    resistance_strain: float = 0.55 / (67.0 * 0.110) / 0.5
+    convection: float = 23.0
+    roughness: float = 2.5
+    ambient: float = 25.0
+    sheath_capacity: float = 0.0
+    sheath_area: float | None = None
+    contact_ratio: float = 50.0
+    contact_smoothing: float = 0.005
+
+    def __post_init__(self) -> None:
+        for name in ("fibre_length", "breaking_force", "resistance_per_length", "convection",
+                     "roughness", "contact_ratio"):  # fmt: skip
+            _require(name, getattr(self, name), above=0.0)
+        _require("coil_radius (spring index above 1)", self.coil_radius, above=self.fibre.radius)
+        _require("pitch_angle", self.pitch_angle, above=0.0, below=math.pi / 2.0)
+        _require("minimum_pitch_angle", self.minimum_pitch_angle, above=0.0, below=self.pitch_angle)
+        _require("ambient", self.ambient, above=_ABSOLUTE_ZERO)
+        _require("contact_smoothing", self.contact_smoothing, above=0.0, below=1.0)
+        _require_not_negative("sheath_capacity", self.sheath_capacity)
+        if self.sheath_area is not None:
+            _require("sheath_area", self.sheath_area, above=0.0)
+        _require_not_negative("resistance_strain", self.resistance_strain)
+        if not self.resistance_strain * (1.0 / math.sin(self.pitch_angle) - 1.0) < 1.0:
+            raise ValueError(
+                f"resistance_strain = {self.resistance_strain} leaves no resistance at full "
+                f"stretch; it must be below {1.0 / (1.0 / math.sin(self.pitch_angle) - 1.0)}"
+            )
+
+    @property
+    def rest_length(self) -> float:
+        """Natural length l_t sin(alpha*): no load, reference temperature [m]."""
+        return self.fibre_length * math.sin(self.pitch_angle)
+
+    @property
+    def minimum_length(self) -> float:
+        """Length at which neighbouring coils touch [m]."""
+        return self.fibre_length * math.sin(self.minimum_pitch_angle)
+
+    @property
+    def winding(self) -> float:
+        """Angle W about the coil's axis per fibre length, cos(alpha*)/r* [rad/m]."""
+        return math.cos(self.pitch_angle) / self.coil_radius
+
+    @property
+    def coils(self) -> float:
+        """Number of coils."""
+        return self.winding * self.fibre_length / (2.0 * math.pi)
+
+    @property
+    def mass(self) -> float:
+        """Mass of the fibre, without a sheath [kg]."""
+        return self.fibre.density * self.fibre.area * self.fibre_length
+
+    @property
+    def heat(self) -> HeatSpec:
+        """Lumped thermal constants, Sun, eq. (3.1); with a sheath the loss is h sheath_area."""
+        area = self.sheath_area
+        if area is None:
+            area = self.roughness * 2.0 * math.pi * self.fibre.radius * self.fibre_length
+        return HeatSpec(
+            capacity=self.mass * self.fibre.specific_heat + self.sheath_capacity,
+            loss=self.convection * area,
+            ambient=self.ambient,
+        )
+
+    def of_length(self, rest_length: float) -> "TcaSpec":
+        """A piece of the same coil (and sheath) with another natural length [m]."""
+        _require("rest_length", rest_length, above=0.0)
+        scale = rest_length / self.rest_length
+        return replace(
+            self,
+            fibre_length=scale * self.fibre_length,
+            sheath_capacity=scale * self.sheath_capacity,
+            sheath_area=None if self.sheath_area is None else scale * self.sheath_area,
+        )
+
+
+# Sun, Section 2.1.1 and Table 2.1: thread of 0.34 mm diameter with 287 turns on 350 mm. The
+# moduli and the expansion are those of Chapter 3. The influence of the load is left out: it was
+# fitted to a fibre of 0.21 mm, and this one reaches the end of that fit, 171 rad/m, at 0.31 N.
+_THREAD_2 = FibreSpec(radius=0.17e-3, inserted_twist=2.0 * math.pi * 287.0 / 0.350)
+# Sun, Table 3.1 (radius 0.21 mm, 4.71 rad/mm).
+_THREAD_3 = FibreSpec(load_softening=(3.24e-4, -0.027, 1.0))
+
+
+def _type(natural: float, contact: float = 0.350 * math.sin(math.radians(11.53))) -> TcaSpec:
+    """Sun, Table 2.1: 350 mm of thread; the lengths are taken, the natural pitch follows.
+
+    The coil radius is that of the outer diameter, (1.08 - 0.34)/2 mm, and agrees with mandrel and
+    thread, (0.405 + 0.34)/2 mm. The coils touch at the made length of type 0: 11.53°, 70 mm.
+    """
+    return TcaSpec(
+        fibre=_THREAD_2,
+        fibre_length=0.350,
+        coil_radius=0.37e-3,
+        pitch_angle=math.asin(natural / 0.350),
+        minimum_pitch_angle=math.asin(contact / 0.350),
+    )
+
+
+# Sun, Table 3.2, free-stroke: 175 mm of fibre made at 22.42° with a coil radius of 0.408 mm.
+# The coils touch at the close packing of that helix, asin(fibre diameter / (2 pi r)) = 9.43°:
+# 36 % below the natural length of 45 mm, like the measured 35.7 % of type 2-180 (Table 2.1).
+_FREE_STROKE_MADE = TcaSpec(
+    fibre=_THREAD_3,
+    fibre_length=0.175,
+    coil_radius=0.408e-3,
+    pitch_angle=math.radians(22.42),
+    minimum_pitch_angle=math.asin(0.42 / (2.0 * math.pi * 0.408)),
+)
+# The same at its natural length of 45 mm: 14.90°; the number of coils is kept, so that
+# r = 0.408 mm cos(14.90°)/cos(22.42°) = 0.427 mm.
+_FREE_STROKE = replace(
+    _FREE_STROKE_MADE,
+    pitch_angle=math.asin(0.045 / 0.175),
+    coil_radius=math.cos(math.asin(0.045 / 0.175)) / _FREE_STROKE_MADE.winding,
+)
+# Sun, Table 3.2, self-coiled. Fitted to its measured stroke: 1.6 times the untwist (comment in
+# the code published with Sun et al., github.com/jiefengsun/TCA-TRO). The load does not soften it:
+# the published polynomial would leave no modulus at the 200 g that it lifts. Contact: close
+# packing. Breaking force: an estimate from the 240 g under which the thread is twisted, above
+# which it "may easily break" (Section 2.1.1).
+_SELF_COILED = TcaSpec(
+    fibre=FibreSpec(untwist_scale=1.6),
+    fibre_length=0.175,
+    coil_radius=0.227e-3,
+    pitch_angle=math.radians(18.66),
+    minimum_pitch_angle=math.asin(0.42 / (2.0 * math.pi * 0.227)),
+    breaking_force=0.240 * 9.81,
+)
+
+CATALOGUE: Mapping[str, TcaSpec] = MappingProxyType(
+    {
+        # The contact length of type 0 follows from its free stroke of 5.7 %: the coils must touch
+        # below its natural length, which is shorter than its made length.
+        "type-0-180": _type(0.061, contact=0.061 * (1.0 - 0.057)),
+        "type-1-180": _type(0.088),
+        "type-2-180": _type(0.109),
+        "type-1-200": _type(0.096),
+        "type-2-200": _type(0.134),
+        "free-stroke": _FREE_STROKE,
+        "free-stroke-made": _FREE_STROKE_MADE,
+        "self-coiled": _SELF_COILED,
+    }
+)
