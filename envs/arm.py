@@ -94,7 +94,7 @@ class ArmPickPlace(gym.Env[Observation, Action]):
         *,
         render_mode: str | None = None,
         arm_spec: ArmSpec | None = None,
-        timestep: float = 2e-3,
+        timestep: float = 4e-3,
         camera: str = "front",
         size: tuple[int, int] = (960, 720),
     ) -> None:

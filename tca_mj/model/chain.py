@@ -178,7 +178,7 @@ class _Look:
             friction=list(self.friction),
             contype=0,
             conaffinity=1 if self.collide else 0,
-            condim=4,
+            condim=3,
             solref=[5e-3, 1.0],
             solimp=[0.95, 0.99, 5e-4, 0.5, 2.0],
         )
