@@ -27,31 +27,36 @@ class PickAndPlaceGains:
     Attributes:
         hottest: Temperature that no TCA is asked to pass [°C].
         settling: Time in which a TCA is brought to a temperature [s].
+        averaging: Time over which positions are averaged [s].
         bend_rate: Temperature asked for per offset of the gripper and second [K/(m s)].
         bend_now: Temperature asked for per offset of the gripper [K/m].
-        taut: Tension that no bending TCA should fall below [N]. A slack TCA no longer holds the
-            soft body against twisting, and a strongly bent arm would roll over.
-        brace_rate: Temperature asked for per missing tension and second [K/(N s)].
+        brace: Rise of all three bending TCAs over the largest that the bend asks for. Pulling
+            against each other they hold the soft body: strongly bent by one side alone it would
+            roll over, from about 140 °C on.
         wrist_slope: Rise of temperature that turns the wrist by one radian [K/rad].
         opening_slope: Rise of temperature that opens the gripper by one metre [K/m].
         clearance: Opening beyond the object's width [m].
+        grasp_depth: How far below the object's centre the finger tips close, over its width.
         aligned: Offset of the gripper with which it goes down [m].
         aligned_yaw: Misalignment of the wrist with which it goes down [rad].
+        over_cup: Offset of the object from the cup's axis at which it is let go [m].
         carry_height: Height of the object while it is carried [m].
         drop_height: Height of the object when it is let go [m].
     """
 
-    hottest: float = 165.0
+    hottest: float = 160.0
     settling: float = 0.6
+    averaging: float = 0.6
     bend_rate: float = 2000.0
     bend_now: float = 1500.0
-    taut: float = 0.012
-    brace_rate: float = 2000.0
+    brace: float = 0.55
     wrist_slope: float = 45.0
     opening_slope: float = 5000.0
     clearance: float = 8e-3
+    grasp_depth: float = 0.2
     aligned: float = 1.0e-3
     aligned_yaw: float = 0.07
+    over_cup: float = 6e-3
     carry_height: float = 45e-3
     drop_height: float = 30e-3
 
@@ -74,10 +79,10 @@ class PickAndPlace:
     since: float = 0.0
     tries: int = 1
     _bend: NDArray[np.float64] = field(default_factory=lambda: np.zeros(2))
-    _brace: NDArray[np.float64] = field(default_factory=lambda: np.zeros(3))
     _calm: float = 0.0
     _opening: float = 0.0
     _height: float = 0.0
+    _mean: NDArray[np.float64] | None = None
     _heat: "_Heaters" = field(init=False)
 
     def __post_init__(self) -> None:
@@ -86,12 +91,18 @@ class PickAndPlace:
     def reset(self) -> None:
         """Starts anew."""
         self.phase, self.since, self.tries = "align", 0.0, 1
-        self._bend, self._brace = np.zeros(2), np.zeros(3)
+        self._bend = np.zeros(2)
         self._calm = self._opening = self._height = 0.0
+        self._mean = None
 
     def act(self, observation: NDArray[np.float32]) -> NDArray[np.float32]:
         """The action for the next control period, shape (6,)."""
         seen = _Seen(observation)
+        if self._mean is None:
+            self._mean = np.stack([seen.gripper, seen.object])
+        # The soft arm swings: steering on what it does on average does not drive the swing.
+        self._mean += _DT / self.gains.averaging * ([seen.gripper, seen.object] - self._mean)
+        seen.gripper, seen.object = self._mean
         self.since += _DT
         self._calm = self._calm + _DT if abs(seen.opening - self._opening) < 2e-5 else 0.0
         self._opening = seen.opening
@@ -100,7 +111,7 @@ class PickAndPlace:
             if following == "open" and self.phase in ("pinch", "lift"):
                 self.tries += 1
             self.phase, self.since, self._calm = following, 0.0, 0.0
-            self._height = seen.object[2]
+            self._height = seen.object[2] - self.gains.grasp_depth * seen.width
         return self._command(seen)
 
     def _next(self, seen: "_Seen") -> str:
@@ -115,7 +126,7 @@ class PickAndPlace:
                 return "lower"
             case "lower" if abs(seen.gripper[2] - self._height) < 5e-4 or late:
                 return "pinch"
-            case "pinch" if (self._calm > 0.8 and seen.temperature[_GRIPPER] < 60.0) or late:
+            case "pinch" if self._calm > 0.8 or seen.temperature[_GRIPPER] < 50.0:
                 return "lift"
             case "lift" if self.since > 1.0 and seen.object[2] < seen.gripper[2] - 8e-3:
                 return "open" if self.tries < 3 else "done"
@@ -124,7 +135,7 @@ class PickAndPlace:
             case "turn back" if abs(seen.yaw) < 0.2 or late:
                 return "bend"
             case "bend" if (
-                float(np.linalg.norm(seen.object[:2] - seen.cup[:2])) < 5e-3
+                float(np.linalg.norm(seen.object[:2] - seen.cup[:2])) < gains.over_cup
                 and seen.object[2] < gains.drop_height + 2e-3
             ) or late:
                 return "release"
@@ -151,7 +162,7 @@ class PickAndPlace:
             target[_BENDING] = self._steer(seen, np.zeros(2))
         if phase in ("open", "lower", "release"):
             wanted = seen.width + gains.clearance * (1.5 if phase == "release" else 1.0)
-            target[_GRIPPER] = seen.temperature[_GRIPPER] + 0.3 * gains.opening_slope * (
+            target[_GRIPPER] = seen.temperature[_GRIPPER] + 0.5 * gains.opening_slope * (
                 wanted - seen.opening
             )
         power = self._heat.power(
@@ -173,34 +184,33 @@ class PickAndPlace:
         wanted = self._bend + self.gains.bend_now * error
         share = (2.0 / 3.0) * _SIDES @ wanted
         share -= share.min()
-        excess = share.max() - (self.gains.hottest - 40.0)
+        excess = share.max() + seen.ambient - self.gains.hottest
         if excess > 0.0:  # no wind-up against the hottest temperature
             self._bend *= 1.0 - excess / share.max()
             share *= 1.0 - excess / share.max()
-        missing = self.gains.taut - seen.tension[_BENDING]
-        self._brace = np.clip(self._brace + self.gains.brace_rate * _DT * missing, 0.0, 60.0)
-        return seen.ambient + self._brace + share
+        brace = self.gains.brace * share.max()
+        return seen.ambient + np.maximum(share, brace)
 
     def _climb(self, seen: "_Seen") -> float:
         """Velocity of the base [m/s]."""
         match self.phase:
             case "lower":
-                return 2.0 * (self._height - seen.gripper[2])
+                return 1.2 * (self._height - seen.gripper[2])
             case "pinch":
                 return 0.0
             case "lift" | "turn back":
-                return 2.0 * (self.gains.carry_height - seen.object[2])
+                return 1.0 * (self.gains.carry_height - seen.object[2])
             case "bend" | "release":
                 aside = float(np.linalg.norm(seen.object[:2] - seen.cup[:2]))
-                near = aside < 8e-3 or self.phase == "release"
+                near = aside < 10e-3 or self.phase == "release"
                 height = self.gains.drop_height if near else self.gains.carry_height
                 if self.phase == "release":
                     return 0.0
-                return 2.0 * (height - seen.object[2])
+                return 0.7 * (height - seen.object[2])
             case "done":
                 return 0.02
             case _:
-                return 2.0 * (seen.object[2] + 20e-3 - seen.gripper[2])
+                return 1.2 * (seen.object[2] + 20e-3 - seen.gripper[2])
 
 
 # Unit vectors in the world towards which the three TCAs bend the hanging arm: the module's x

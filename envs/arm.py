@@ -37,14 +37,16 @@ OBSERVATION = Table(
         Entry("object orientation", 4, -1.0, 1.0, "quaternion wxyz"),
         Entry("object velocity", 3, -10.0, 10.0, "m/s"),
         Entry("object angular velocity", 3, -2000.0, 2000.0, "rad/s"),
+        Entry("object carried", 1, 0.0, 1.0, "1 once it has been lifted off its stand"),
         Entry("cup position", 3, -0.5, 0.5, "m"),
     ]
 )
 ACTION = Table([Entry("TCA power", 5, -1.0, 1.0, "-"), Entry("base velocity", 1, -1.0, 1.0, "-")])
 
 _STAND = 25e-3  # height of the objects' centres on their stands [m]
+_LIFTED = 8e-3  # height above the stand at which an object counts as carried [m]
 _PARKED = (0.09, 0.08)  # where the object that is not used stands [m]
-_CUP_RADIUS, _CUP_RIM = 14e-3, 14e-3  # of assets/mjcf/cup.xml [m]
+_CUP_RADIUS, _CUP_RIM = 12.5e-3, 16e-3  # of assets/mjcf/cup.xml [m]
 
 
 class ArmPickPlace(gym.Env[Observation, Action]):
@@ -58,14 +60,16 @@ class ArmPickPlace(gym.Env[Observation, Action]):
             ``gripper.tca``; -1 is off, 1 is ``max_power``, linear in between.
         5: velocity of the base over the arm's largest speed; positive is up.
 
-    Observation, shape (42,): see ``OBSERVATION``, whose rows have units and bounds. Positions and
+    Observation, shape (43,): see ``OBSERVATION``, whose rows have units and bounds. Positions and
     orientations are those of the world; the gripper's are of the point where its tips meet when
     closed, with the fingers in its x-z plane and z from mount to tips.
 
     Reward, the sum of the terms in ``info["reward_terms"]``:
-        reach: Up to 0.1 while the gripper is at the object, 0.1 once that is in the cup.
-        carry: Up to 0.4 the closer the lifted object is to the mouth of the cup.
-        place: 20 in the step in which the object rests in the cup.
+        reach: Up to 0.1, the closer the gripper is to the object.
+        carry: Up to 0.4, the closer the object is to the cup's axis, once it has been carried:
+            lifted 8 mm off its stand. Pushed off its stand into the cup it earns nothing.
+        place: 20 in the step in which the object, having been carried, has rested in the cup for
+            0.3 s, untouched by the arm.
         energy: Minus 0.002 per joule of electrical energy.
 
     Reset: the arm is cold and at rest above the object, which lies on its stand, moved and turned
@@ -86,7 +90,7 @@ class ArmPickPlace(gym.Env[Observation, Action]):
     control_period = 0.1  # [s]
     object_range = 5e-3  # largest offset of the object in x and in y [m]
     yaw_range = (np.radians(120.0), np.radians(155.0))
-    cup_range = (24e-3, 29e-3)  # distance of the cup's axis from the arm's [m]
+    cup_range = (22.5e-3, 26.5e-3)  # distance of the cup's axis from the arm's [m]
     cup_angle = np.radians(20.0)  # of the cup's direction about -x
 
     def __init__(
@@ -178,7 +182,7 @@ class ArmPickPlace(gym.Env[Observation, Action]):
         self._place(self.object, setup["object_position"], setup["object_yaw"])
         data.mocap_pos[self._cup] = [*setup["cup_position"], 0.0]
         mujoco.mj_forward(self.model, data)
-        self._in_cup = 0
+        self._in_cup, self._carried = 0, False
         return self._observe(), {"object": self.object, **self._info()}
 
     def _setup(self, options: Mapping[str, Any]) -> dict[str, Any]:
@@ -252,6 +256,7 @@ class ArmPickPlace(gym.Env[Observation, Action]):
             self.sim.step(power, self.control_period)
         except SimulationDiverged as error:
             reason = f"diverged: {error}"
+        self._carried = self._carried or bool(self._position()[2] > _STAND + _LIFTED)
         observation = self._observe()
         outside = OBSERVATION.outside(observation)
         if outside:
@@ -302,6 +307,7 @@ class ArmPickPlace(gym.Env[Observation, Action]):
                 "object orientation": object_turn if object_turn[0] >= 0.0 else -object_turn,
                 "object velocity": data.qvel[dofs : dofs + 3],
                 "object angular velocity": data.qvel[dofs + 3 : dofs + 6],
+                "object carried": float(self._carried),
                 "cup position": data.mocap_pos[self._cup],
             }
         )
@@ -328,14 +334,13 @@ class ArmPickPlace(gym.Env[Observation, Action]):
         position, cup = seen["object position"], seen["cup position"]
         aside = float(np.hypot(*(position - cup)[:2]))
         inside = aside < _CUP_RADIUS and position[2] < _CUP_RIM
-        rests = inside and np.linalg.norm(seen["object velocity"]) < 0.02 and not self._touched()
+        rests = inside and self._carried and np.linalg.norm(seen["object velocity"]) < 0.02 and not self._touched()
         gap = float(np.linalg.norm(position - seen["gripper position"]))
-        lifted = bool(position[2] > _STAND + 3e-3)
         near = float(rewards.tolerance(gap, bounds=(0.0, 4e-3), margin=0.05))
         over = float(rewards.tolerance(aside, bounds=(0.0, 8e-3), margin=0.03))
         return {
-            "reach": 0.1 if inside else 0.1 * near,
-            "carry": 0.4 if inside else 0.4 * over * lifted,
+            "reach": 0.1 * near,
+            "carry": 0.4 * over * self._carried,
             "energy": -0.002 * energy,
         }, rests
 

@@ -158,11 +158,14 @@ class Simulation:
         Raises:
             ValueError: If the power has the wrong shape, is negative or not finite, or the
                 duration is no multiple of ``tca_period``.
-            SimulationDiverged: If the state is no longer finite.
+            SimulationDiverged: If the state is no longer finite, or a TCA is shorter or longer
+                than its law holds for.
         """
         power = np.array(power, dtype=np.float64)
         if power.shape != (self.n,):
             raise ValueError(f"power must have shape ({self.n},), got {power.shape}")
+        if not (np.isfinite(power).all() and (power >= 0.0).all()):
+            raise ValueError(f"power must be finite and at least 0 W, got {power}")
         updates = round(duration / self.tca_period) if np.isfinite(duration) else 0
         if updates < 1 or abs(updates * self.tca_period - duration) > 1e-9:
             raise ValueError(
@@ -171,7 +174,9 @@ class Simulation:
             )
         model, data = self.model, self.data
         for _ in range(updates):
-            self.tca, pull = self.bank.advance(self.tca, power, self.length, self.tca_period)
+            length = self.length
+            self._check_length(length)
+            self.tca, pull = self.bank.advance(self.tca, power, length, self.tca_period)
             self._hand_over(pull)
             mujoco.mj_step(model, data, self._substeps)
             self._check()
@@ -189,6 +194,15 @@ class Simulation:
         model.jnt_stiffness[self._joint] = stiffness
         # The added spring pulls towards the straight joint, the body's own to its reference.
         model.qpos_spring[self._joint_qpos] = self._stiffness * self._spring / stiffness
+
+    def _check_length(self, length: NDArray[np.float64]) -> None:
+        inside = (length > self.bank.shortest) & (length < self.bank.longest)
+        if not inside.all():
+            i = int(np.argmin(inside))
+            raise SimulationDiverged(
+                f"{self.tca_names[i]} has a length of {length[i]:.5g} m at {self.time:.3f} s; its"
+                f" law holds from {self.bank.shortest[i]:.5g} to {self.bank.longest[i]:.5g} m"
+            )
 
     def _check(self) -> None:
         data = self.data

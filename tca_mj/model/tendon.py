@@ -107,6 +107,7 @@ def route_tca(
     stiffening: dict[str, float] = {}
     for index, item in enumerate(passes):
         _check_inside(item, name)
+        _add_mass(item, tca.mass / len(passes))
         held = _held_points(item.chain, sites, name)
         offsets = _site_offsets(item, held)
         for number in range(len(held)) if not item.down else reversed(range(len(held))):
@@ -137,6 +138,13 @@ def route_tca(
         stretch=stretch,
         stiffening=tuple(stiffening.items()),
     )
+
+
+def _add_mass(item: Pass, mass: float) -> None:
+    """Spreads the mass of a leg over the pieces, which carry half a cell more or less each."""
+    for number, piece in enumerate(item.chain.pieces):
+        cells = 0.5 if number in (0, item.chain.nodes) else 1.0
+        piece.first_geom().mass += mass * cells / item.chain.nodes
 
 
 def _check_inside(item: Pass, name: str) -> None:

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 from tca_mj.model.chain import Chain, beam
 from tca_mj.model.part import Part, new_spec
 from tca_mj.model.tendon import Pass, route_tca
-from tca_mj.modules.bending import SILICONE_DENSITY, SILICONE_SHEAR, SILICONE_YOUNG
+from tca_mj.modules.bending import SILICONE_DENSITY, SILICONE_YOUNG
 from tca_mj.rod.beam import BeamSpec
 from tca_mj.routes import UTurn, leg_length
 from tca_mj.tca import CATALOGUE, TcaSpec
@@ -25,17 +25,22 @@ _FRAMES = ((_HALF, 0.0, _HALF, 0.0), (0.0, -_HALF, 0.0, _HALF))
 class FingerPairSpec:
     """A soft body bent to a ring, and the TCA that opens it.
 
+    The body is a laminate: a soft core between two layers of a stiffer elastomer. The published
+    sections, 3 x 6 mm (Sun, Section 5.3) and 3 x 5 mm (Section 4.1.1), are read as core and as
+    thickness with the layers; then the TCA, 2.5 mm off the centre, lies on the outer surface.
+
     Attributes:
         length: Length of the whole body, both fingers [m]. Sun, Section 4.1.1.
         width: Section across the bending plane [m]. Sun, Section 5.3.
-        thickness: Section in the bending plane [m]. Sun, Section 5.3 (3 x 6 mm); only the longer
-            side has room for a TCA 2.5 mm off the centre.
+        core: Thickness of the core in the bending plane [m]. Sun, Section 5.3.
+        layer: Thickness of each layer [m]. Estimate: with the core it makes the 5 mm of
+            Section 4.1.1.
+        layer_young: Young's modulus of the layers [Pa]. Estimate for a platinum-cure silicone of
+            Shore hardness 10A; the layers carry most of the gripping force.
         offset: Distance of the TCA from the centre line, on the outside [m]. Sun, Section 5.3.2.
         half_width: Half the distance between the two legs of the U [m]. Estimate.
         closure: Angle by which each finger is bent when nothing is between them [rad]. Half a
             turn closes the ring.
-        layers: Bending and axial stiffness with the two elastomer layers that bend the body, over
-            that of the body alone. Estimate: the measured gripping force is carried by them.
         nodes: Nodes of each finger.
         friction: Sliding friction of the silicone. Estimate.
         tca: The kind of TCA, cut to the route's length in the closed gripper.
@@ -43,35 +48,52 @@ class FingerPairSpec:
     """
 
     length: float = 35e-3
-    width: float = 3e-3
-    thickness: float = 6e-3
+    width: float = 6e-3
+    core: float = 3e-3
+    layer: float = 1e-3
+    layer_young: float = 0.25e6
     offset: float = 2.5e-3
-    half_width: float = 0.8e-3
+    half_width: float = 1.5e-3
     closure: float = math.pi
-    layers: float = 2.0
     nodes: int = 6
     friction: float = 1.0
     tca: TcaSpec = field(default_factory=lambda: CATALOGUE["free-stroke"])
     sheath_capacity: float = 0.06
 
     @property
+    def thickness(self) -> float:
+        """Thickness of core and layers [m]."""
+        return self.core + 2.0 * self.layer
+
+    @property
     def body(self) -> BeamSpec:
-        """One finger: section x is thickness, outside positive; it bends about y."""
-        core = BeamSpec.box(
-            length=self.length / 2.0,
-            width=self.thickness,
-            height=self.width,
-            young=SILICONE_YOUNG,
-            shear=SILICONE_SHEAR,
-            density=SILICONE_DENSITY,
-        )
+        """One finger: section x is thickness, outside positive; it bends about y.
+
+        The layers add what a plate of theirs of the full thickness has more than the core's.
+        """
+        whole = self._plate(self.thickness, self.layer_young)
+        gap = self._plate(self.core, self.layer_young)
+        core = self._plate(self.core, SILICONE_YOUNG)
         return replace(
-            core,
-            bending=(core.bending[0] * self.layers, core.bending[1] * self.layers),
-            torsion=core.torsion * self.layers,
-            stretching=core.stretching * self.layers,
-            shearing=core.shearing * self.layers,
-            curvature=(0.0, -self.closure / core.length, 0.0),
+            whole,
+            bending=(
+                core.bending[0] + whole.bending[0] - gap.bending[0],
+                core.bending[1] + whole.bending[1] - gap.bending[1],
+            ),
+            torsion=core.torsion + whole.torsion - gap.torsion,
+            stretching=core.stretching + whole.stretching - gap.stretching,
+            shearing=core.shearing + whole.shearing - gap.shearing,
+            curvature=(0.0, -self.closure / whole.length, 0.0),
+        )
+
+    def _plate(self, thickness: float, young: float) -> BeamSpec:
+        return BeamSpec.box(
+            length=self.length / 2.0,
+            width=thickness,
+            height=self.width,
+            young=young,
+            shear=young / 3.0,
+            density=SILICONE_DENSITY,
         )
 
     @property

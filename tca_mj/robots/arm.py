@@ -33,7 +33,7 @@ class ArmSpec:
     twisting: TwistingSpec = field(default_factory=TwistingSpec)
     gripper: FingerPairSpec = field(default_factory=FingerPairSpec)
     connector: float = 1.5e-3
-    connector_mass: float = 0.2e-3
+    connector_mass: float = 0.1e-3
     height: float = 0.14
     travel: tuple[float, float] = (0.07, 0.18)
     speed: float = 0.04
