@@ -29,7 +29,7 @@ TASKS = (
     Task(
         id="TCA/ArmPickPlace-v0",
         entry_point="tca_mj.envs.arm:ArmPickPlace",
-        max_episode_steps=400,
+        max_episode_steps=1000,
     ),
 )
 

@@ -179,7 +179,7 @@ class Simulation:
             self.tca, pull = self.bank.advance(self.tca, power, length, self.tca_period)
             self._hand_over(pull)
             mujoco.mj_step(model, data, self._substeps)
-            self._check()
+        self._check()
         self.power = power
 
     def _hand_over(self, pull: Pull) -> None:
@@ -206,7 +206,8 @@ class Simulation:
 
     def _check(self) -> None:
         data = self.data
-        bad = [w for w in _DIVERGENCE if data.warning[int(w)].number > 0]
+        number = data.warning.number
+        bad = [w for w in _DIVERGENCE if number[int(w)] > 0]
         if bad or not (np.isfinite(data.qpos).all() and np.isfinite(data.qvel).all()):
             names = ", ".join(str(w).rsplit("_", 1)[-1] for w in bad) or "not finite"
             raise SimulationDiverged(

@@ -75,7 +75,7 @@ def beam(
     motions: Sequence[Motion] = MOTIONS,
     pos: Sequence[float] = (0.0, 0.0, 0.0),
     quat: Sequence[float] = (1.0, 0.0, 0.0, 0.0),
-    rgba: Sequence[float] = (0.93, 0.87, 0.78, 1.0),
+    rgba: Sequence[float] = (0.93, 0.89, 0.82, 0.45),
     friction: Sequence[float] = (1.0, 0.005, 0.0001),
     collide: bool = True,
 ) -> Chain:

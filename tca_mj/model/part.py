@@ -76,6 +76,8 @@ def new_spec(name: str) -> mujoco.MjSpec:
     option.timestep = 2e-3
     option.solver = mujoco.mjtSolver.mjSOL_NEWTON
     option.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
-    option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
-    option.impratio = 10.0
+    # Pyramidal cones cost half of elliptic ones in a grasp. The high impedance of friction keeps
+    # what is held from creeping: 7 um/s for a board of 0.9 g between soft fingers, 65 um/s at 10.
+    option.cone = mujoco.mjtCone.mjCONE_PYRAMIDAL
+    option.impratio = 100.0
     return spec

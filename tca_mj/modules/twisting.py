@@ -41,7 +41,7 @@ class TwistingSpec:
     radius: float = 3.5e-3
     turns: float = 5.0
     double: bool = True
-    nodes: int = 12
+    nodes: int = 10
     tca: TcaSpec = field(default_factory=lambda: CATALOGUE["free-stroke"])
     sheath_capacity: float = 0.39
     sheath_area: float = 3.14159 * 3.2e-3
