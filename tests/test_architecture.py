@@ -25,6 +25,8 @@ STACK = ["door", "assets", *LAYERS, "cli"]
 LAYER_OF = {
     "__init__": "door",
     "registry": "door",
+    "machine": "door",
+    "bench": "agents",
     "plots": "control",
     "render": "record",
     "shapes": "record",
@@ -41,6 +43,8 @@ LOWEST = {
     "imageio": "record",
     "rerun": "record",
     "gymnasium": "envs",
+    "dm_env": "envs",
+    "glfw": "envs",
     "stable_baselines3": "agents",
     "torch": "agents",
     "tqdm": "agents",

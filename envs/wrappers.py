@@ -1,0 +1,143 @@
+"""Wrappers of the tasks: what is added to an environment without changing it."""
+
+import atexit
+import time
+from pathlib import Path
+from typing import Any
+
+import gymnasium as gym
+from gymnasium.core import ActType, ObsType
+from gymnasium.utils import RecordConstructorArgs
+
+from tca_mj.record import Recorder
+
+
+class RecordRerun(gym.Wrapper[ObsType, ActType, ObsType, ActType], RecordConstructorArgs):
+    """Records every step of an environment into one ``.rrd`` file.
+
+    The file is made by the first ``reset``; making the wrapper, or making it again from its spec,
+    touches no file. Further episodes go on in the same file: recorded time never runs back, and
+    the events ``reset`` and ``episode 2, seed 3`` mark the place. Events are also written for
+    success and for every other end of an episode, with its reason.
+
+    The file is whole after ``close``, after leaving a ``with`` block by whatever exception, and
+    after a program that ends by Ctrl-C or an error; only a process that is killed outright leaves
+    it without its table of contents (see ``tca_mj.record.Recorder``).
+
+    Attributes:
+        path: The file.
+        recorder: What writes it; None before the first ``reset``.
+        seconds: Time that the recording has taken so far on the caller's thread [s].
+    """
+
+    def __init__(
+        self,
+        env: gym.Env[ObsType, ActType],
+        path: str | Path,
+        *,
+        application_id: str = "tca-mj",
+        every: int = 1,
+        chunk: int = 100,
+        tca_radius: float | None = None,
+        footer: bool = True,
+    ) -> None:
+        """Wraps ``env``; apart from ``env`` the arguments are those of ``Recorder``.
+
+        Args:
+            env: A task of this package: its ``unwrapped`` has the simulation as ``sim``.
+            path: File to write, ending in ``.rrd``. What it held is lost at the first ``reset``.
+            application_id: Name under which the viewer keeps layouts and groups recordings.
+            every: Records every so many-th step.
+            chunk: Recorded steps that are collected before they are written.
+            tca_radius: Radius of the drawn TCAs [m]; None for one that can be seen.
+            footer: Ends the file with a table of contents.
+
+        Raises:
+            ValueError: If ``env`` has no simulation or a number is not positive.
+        """
+        if not hasattr(env.unwrapped, "sim"):
+            raise ValueError(f"env must have a simulation as env.unwrapped.sim, got {env}")
+        if every < 1 or chunk < 1:
+            raise ValueError(f"every and chunk must be at least 1, got {every} and {chunk}")
+        if tca_radius is not None and not tca_radius > 0.0:
+            raise ValueError(f"tca_radius must be above 0 m, got {tca_radius}")
+        options: dict[str, Any] = {
+            "application_id": application_id,
+            "every": every,
+            "chunk": chunk,
+            "tca_radius": tca_radius,
+            "footer": footer,
+        }
+        RecordConstructorArgs.__init__(self, path=str(path), **options)
+        gym.Wrapper.__init__(self, env)
+        self.path = Path(path)
+        self.recorder: Recorder | None = None
+        self.seconds = 0.0
+        self._options = options
+        self._episode = 0
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[ObsType, dict[str, Any]]:
+        """Resets the environment and records the beginning of an episode.
+
+        Raises:
+            RuntimeError: If the wrapper was closed: a new beginning would overwrite the file.
+        """
+        observation, info = self.env.reset(seed=seed, options=options)
+        start = time.perf_counter()
+        simulation: Any = self.env.unwrapped
+        if self.recorder is None:
+            self.recorder = Recorder(simulation.sim, self.path, **self._options)
+            atexit.register(self.recorder.close)
+        self._episode += 1
+        drawn = "" if seed is None else f", seed {seed}"
+        self.recorder.event(f"episode {self._episode}{drawn}")
+        if self._episode > 1:
+            self.recorder.frame()
+        self.seconds += time.perf_counter() - start
+        return observation, info
+
+    def step(self, action: ActType) -> tuple[ObsType, Any, bool, bool, dict[str, Any]]:
+        """Steps the environment and records where that led to."""
+        observation, reward, terminated, truncated, info = self.env.step(action)
+        start = time.perf_counter()
+        if self.recorder is not None:
+            self.recorder.frame(info.get("reward_terms", {"reward": reward}))
+            ending = how_it_ended(terminated, truncated, info)
+            if ending is not None:
+                self.recorder.event(ending)
+        self.seconds += time.perf_counter() - start
+        return observation, reward, terminated, truncated, info
+
+    def event(self, text: str) -> None:
+        """Writes ``text`` beside the present time.
+
+        Raises:
+            RuntimeError: If the environment was not reset yet, or is closed.
+        """
+        if self.recorder is None:
+            raise RuntimeError(f"nothing is recorded to {self.path} before the first reset")
+        start = time.perf_counter()
+        self.recorder.event(text)
+        self.seconds += time.perf_counter() - start
+
+    def close(self) -> None:
+        """Finishes the file and closes the environment; it may be called again."""
+        start = time.perf_counter()
+        try:
+            if self.recorder is not None:
+                self.recorder.close()
+                atexit.unregister(self.recorder.close)
+        finally:
+            self.seconds += time.perf_counter() - start
+            self.env.close()
+
+
+def how_it_ended(terminated: bool, truncated: bool, info: dict[str, Any]) -> str | None:
+    """Why an episode is over, in a few words; None if it goes on."""
+    if terminated:
+        return "success" if info.get("success") else info.get("termination_reason", "terminated")
+    if truncated:
+        return info.get("truncation_reason", "time limit")
+    return None

@@ -1,0 +1,139 @@
+"""Runs the scripted demo on many seeds and prints how often it succeeds, as Markdown.
+
+    python scripts/success_table.py                      20 seeds of each object, two processes
+    python scripts/success_table.py --seeds 2 --fresh
+
+Every finished episode is one line of ``results.jsonl``; a second run goes on where the first one
+stopped. What was measured with other versions of the packages is not mixed in, but changes of the
+code between two releases are not seen: use ``--fresh`` after them.
+"""
+
+import argparse
+import json
+import multiprocessing
+import sys
+from collections.abc import Iterable, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from tqdm import tqdm
+
+from tca_mj.agents.demo import pick_and_place
+from tca_mj.envs.arm import OBJECTS
+from tca_mj.machine import machine, versions
+
+
+def run(case: tuple[str, int]) -> dict[str, Any]:
+    """The summary of one episode that is not recorded."""
+    return pick_and_place(object=case[0], seed=case[1], progress=False)
+
+
+def kept(path: Path) -> dict[tuple[str, int], dict[str, Any]]:
+    """Results of the present versions in a file; a line that was cut off is skipped."""
+    found: dict[tuple[str, int], dict[str, Any]] = {}
+    for line in path.read_text(encoding="utf-8").splitlines() if path.exists() else ():
+        try:
+            result = json.loads(line)
+        except ValueError:
+            continue
+        if result["versions"] == versions():
+            found[result["object"], result["seed"]] = result
+    return found
+
+
+def table(results: Iterable[dict[str, Any]]) -> str:
+    """Results as Markdown: rates by object, then every episode."""
+    ordered = sorted(results, key=lambda r: (r["object"], r["seed"]))
+    groups = {kind: [r for r in ordered if r["object"] == kind] for kind in OBJECTS}
+    lines = [
+        "| object | episodes | in the cup | duration [s] | energy [J] | peak temperature [°C] |",
+        "|---|---|---|---|---|---|",
+    ]
+    for kind, group in [*groups.items(), ("all", ordered)]:
+        if group:
+            won = sum(r["success"] for r in group)
+            lines.append(
+                f"| {kind} | {len(group)} | {won} ({100 * won / len(group):.0f} %)"
+                f" | {_spread([r['duration'] for r in group])}"
+                f" | {_spread([_energy(r) for r in group])}"
+                f" | {_spread([_hottest(r) for r in group])} |"
+            )
+    lines += [
+        "",
+        "Duration, energy and peak temperature: median (least to most).",
+        "",
+        "| object | seed | ending | tries | duration [s] | energy [J] | peak temperature [°C]"
+        " | object from the cup's axis [mm] |",
+        "|---|---|---|---|---|---|---|---|",
+    ]
+    for r in ordered:
+        aside = np.hypot(*np.subtract(r["object_position"], r["cup_position"])[:2])
+        lines.append(
+            f"| {r['object']} | {r['seed']} | {r['ending']} | {r['tries']} | {r['duration']:.1f}"
+            f" | {_energy(r):.0f} | {_hottest(r):.0f} | {1e3 * aside:.1f} |"
+        )
+    return "\n".join(lines)
+
+
+def _energy(result: dict[str, Any]) -> float:
+    return sum(result["energy"].values())
+
+
+def _hottest(result: dict[str, Any]) -> float:
+    return max(result["peak_temperature"].values())
+
+
+def _spread(values: Sequence[float]) -> str:
+    return f"{np.median(values):.0f} ({min(values):.0f} to {max(values):.0f})"
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Runs what is missing and prints the table."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--seeds", type=int, default=20, help="seeds 0, 1, ... of each object")
+    parser.add_argument("--object", choices=list(OBJECTS), help="only this one")
+    parser.add_argument("--workers", type=int, default=2, help="processes")
+    parser.add_argument("--out", type=Path, default=Path("runs/success"), help="folder")
+    parser.add_argument("--fresh", action="store_true", help="forget earlier results")
+    arguments = parser.parse_args(argv)
+
+    arguments.out.mkdir(parents=True, exist_ok=True)
+    path = arguments.out / "results.jsonl"
+    if arguments.fresh:
+        path.unlink(missing_ok=True)
+    kinds = [arguments.object] if arguments.object else list(OBJECTS)
+    cases = [(kind, seed) for seed in range(arguments.seeds) for kind in kinds]
+    results = kept(path)
+    missing = [case for case in cases if case not in results]
+    context = multiprocessing.get_context("spawn")
+    pool = ProcessPoolExecutor(arguments.workers, mp_context=context)
+    try:
+        waiting = [pool.submit(run, case) for case in missing]
+        for done in tqdm(as_completed(waiting), total=len(waiting), unit="episode", disable=None):
+            result = done.result()
+            results[result["object"], result["seed"]] = result
+            with path.open("a", encoding="utf-8") as file:
+                file.write(json.dumps(result, ensure_ascii=False) + "\n")
+    except KeyboardInterrupt:
+        print(f"interrupted; run it again to go on from {path}", file=sys.stderr)
+        return 130
+    finally:
+        pool.shutdown(wait=False, cancel_futures=True)
+
+    where = machine()
+    said = table(results[case] for case in cases)
+    report = (
+        f"{said}\n\n{where['cpu']}, {where['cores']} cores; "
+        + ", ".join(f"{name} {number}" for name, number in versions().items())
+    )
+    (arguments.out / "table.md").write_text(report + "\n", encoding="utf-8")
+    print(report)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

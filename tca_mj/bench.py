@@ -1,0 +1,281 @@
+"""How fast it runs here: the arm, its task, its recordings.
+
+Every figure is a median over single steps, in processor time: machines are noisy, and what else
+runs on them must not count. Physics and TCAs use one thread, so that processor time is what passes
+on a machine with nothing else to do. What is compared is measured in turns: the bare physics steps
+are repeated from the very state that the environment started its own from, now before and now
+after it. What a recording costs includes the threads that write it.
+"""
+
+import json
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, Self
+
+import gymnasium as gym
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+from tqdm import tqdm
+
+from tca_mj.agents.scripted import PickAndPlace
+from tca_mj.envs.arm import ArmPickPlace
+from tca_mj.envs.wrappers import RecordRerun
+from tca_mj.machine import machine, versions
+from tca_mj.sim import Simulation
+
+# What is aimed at: real-time factor of the arm, env.step over its physics steps, and the
+# recorder's share of the simulation's time.
+TARGETS = {"real_time_factor": 5.0, "step_ratio": 1.25, "recording_share": 0.20}
+
+_HOT = 120.0  # steady temperature of the bending TCA of the hot bent arm [°C]
+_STATE = int(mujoco.mjtState.mjSTATE_INTEGRATION)
+
+
+def benchmark(*, scale: float = 1.0, out: Path | None = None) -> dict[str, Any]:
+    """Measures everything, about a minute.
+
+    Args:
+        scale: Share of the full number of repetitions and of the episode's length.
+        out: Folder for ``benchmark.json`` and ``benchmark.md``; None to write nothing.
+
+    Returns:
+        ``machine``, ``versions``, ``model`` (its size), ``arm`` (idle and hot arm), ``episode``
+        (by phase), ``recording`` and ``bank``; processor times in s; ``report`` says what they are.
+
+    Raises:
+        ValueError: If ``scale`` is not above 0 and at most 1.
+    """
+    if not 0.0 < scale <= 1.0:
+        raise ValueError(f"scale must be above 0 and at most 1, got {scale}")
+    task = ArmPickPlace()
+    steps = max(int(400 * scale), 4)
+    repetitions = max(int(100 * scale), 2)
+    with tqdm(total=3 * repetitions + 2 * steps, disable=None, unit="step", leave=False) as bar:
+        task.reset(seed=0)
+        idle = _arm(task.sim, np.zeros(task.sim.n), repetitions, bar.update)
+        task.reset(seed=0)
+        hot = _arm(task.sim, _heating(task.sim), repetitions, bar.update)
+        result = {
+            "machine": machine(),
+            "versions": versions(),
+            "model": {
+                "degrees_of_freedom": int(task.model.nv),
+                "bodies": int(task.model.nbody),
+                "tcas": task.sim.n,
+                "timestep": float(task.model.opt.timestep),
+                "tca_period": task.sim.tca_period,
+                "control_period": task.control_period,
+            },
+            "arm": {"idle": idle, "hot and bent": hot},
+            "episode": _episode(task, steps, bar.update),
+            "recording": _recording(task, steps, bar.update),
+            "bank": _bank(task.sim, 20 * repetitions),
+        }
+    task.close()
+    if out is not None:
+        out.mkdir(parents=True, exist_ok=True)
+        text = json.dumps(result, indent=2, ensure_ascii=False) + "\n"
+        (out / "benchmark.json").write_text(text, encoding="utf-8")
+        (out / "benchmark.md").write_text(report(result) + "\n", encoding="utf-8")
+    return result
+
+
+def report(result: dict[str, Any]) -> str:
+    """What ``benchmark`` measured, as Markdown."""
+    where, model = result["machine"], result["model"]
+    kept = ", ".join(f"{name} {number}" for name, number in result["versions"].items())
+    lines = [
+        f"{where['cpu']}, {where['cores']} cores; {where['system']}",
+        f"{kept}",
+        "",
+        f"Scene of the arm: {model['degrees_of_freedom']} degrees of freedom,"
+        f" {model['bodies']} bodies, {model['tcas']} TCAs; time step"
+        f" {1e3 * model['timestep']:g} ms, TCAs every {1e3 * model['tca_period']:g} ms,"
+        f" control every {1e3 * model['control_period']:g} ms.",
+        "",
+        f"| physics and TCAs, one core | times real time (aim: {TARGETS['real_time_factor']:g}) |",
+        "|---|---|",
+    ]
+    for name, factor in result["arm"].items():
+        lines.append(f"| {name} arm | {factor:.1f} |")
+    phases = result["episode"]["phases"]
+    for name, row in phases.items():
+        lines.append(f"| demo, {name} | {row['real_time_factor']:.1f} |")
+    lines += [
+        "",
+        "| | env.step | its bare mj_steps | ratio"
+        f" (aim: {TARGETS['step_ratio']:g}) | outside mj_step |",
+        "|---|---|---|---|---|",
+    ]
+    for name, row in {**phases, "all of it": result["episode"]["all"]}.items():
+        lines.append(
+            f"| {name} | {1e3 * row['step']:.2f} ms | {1e3 * row['bare']:.2f} ms"
+            f" | {row['ratio']:.3f} | {1e3 * row['outside']:.2f} ms |"
+        )
+    recording, bank = result["recording"], result["bank"]
+    lines += [
+        "",
+        "| | |",
+        "|---|---|",
+        f"| opening a recording | {1e3 * recording['opening']:.0f} ms |",
+        f"| recording a step, caller's thread | {1e6 * recording['per_step']:.0f} µs |",
+        f"| recording, all threads, share of the simulation's time"
+        f" (aim: below {100 * TARGETS['recording_share']:.0f} %)"
+        f" | {100 * recording['share']:.1f} % |",
+        f"| recording, size | {1e-3 * recording['bytes_per_second']:.0f} kB per simulated second |",
+        f"| bank.advance, {model['tcas']} TCAs | {1e6 * bank['advance']:.0f} µs |",
+    ]
+    return "\n".join(lines)
+
+
+def _arm(
+    sim: Simulation, power: NDArray[np.float64], repetitions: int, tick: Callable[[], object]
+) -> float:
+    """Real-time factor of ``Simulation.step``, after half as many steps that are not measured."""
+    period = ArmPickPlace.control_period
+    taken = []
+    for k in range(-(repetitions // 2), repetitions):
+        start = time.thread_time()
+        sim.step(power, period)
+        if k >= 0:
+            taken.append(time.thread_time() - start)
+        tick()
+    return period / float(np.median(taken))
+
+
+def _heating(sim: Simulation) -> NDArray[np.float64]:
+    """Power that keeps the second bending TCA hot and the others cold."""
+    power = np.zeros(sim.n)
+    heat = sim.bank.specs[1].heat
+    power[1] = heat.loss * (_HOT - heat.ambient)
+    return power
+
+
+class _Stopwatch:
+    """Adds up the time spent in one function of an object; a context manager."""
+
+    def __init__(self, owner: Any, name: str) -> None:
+        self.seconds = 0.0
+        self.plain = getattr(owner, name)
+        self._owner, self._name = owner, name
+        self._own = name in vars(owner)
+
+    def __enter__(self) -> Self:
+        setattr(self._owner, self._name, self._timed)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self._own:
+            setattr(self._owner, self._name, self.plain)
+        else:
+            delattr(self._owner, self._name)
+
+    def _timed(self, *arguments: Any) -> Any:
+        start = time.thread_time()
+        try:
+            return self.plain(*arguments)
+        finally:
+            self.seconds += time.thread_time() - start
+
+
+def _episode(task: ArmPickPlace, steps: int, tick: Callable[[], object]) -> dict[str, Any]:
+    """The scripted demo, every step of it against its own physics steps."""
+    model = task.model
+    state = np.empty(mujoco.mj_stateSize(model, _STATE))
+    beside = mujoco.MjData(model)
+    count = round(task.control_period / model.opt.timestep)
+
+    def bare() -> float:
+        mujoco.mj_setState(model, beside, state, _STATE)
+        start = time.thread_time()
+        mujoco.mj_step(model, beside, count)
+        return time.thread_time() - start
+
+    policy = PickAndPlace()
+    observation, _ = task.reset(seed=0, options={"object": "screwdriver"})
+    rows: list[tuple[float, float, float, float]] = []
+    phases: list[str] = []
+    for k in range(steps):
+        action = policy.act(observation)
+        mujoco.mj_getState(model, task.data, state, _STATE)
+        alone = bare() if k % 2 else 0.0
+        with _Stopwatch(mujoco, "mj_step") as inside, _Stopwatch(task.sim, "step") as coupled:
+            start = time.thread_time()
+            observation, _, terminated, truncated, _ = task.step(action)
+            taken = time.thread_time() - start
+        rows.append((taken, alone or bare(), inside.seconds, coupled.seconds))
+        phases.append(policy.phase)
+        tick()
+        if terminated or truncated:
+            break
+    table, names = np.array(rows), np.array(phases)
+    found = {name: names == name for name in dict.fromkeys(phases)}
+    return {
+        "phases": {name: _row(table[which]) for name, which in found.items()},
+        "all": _row(table),
+    }
+
+
+def _row(table: NDArray[np.float64]) -> dict[str, float]:
+    step, alone, inside, coupled = table.T
+    return {
+        "step": float(np.median(step)),
+        "bare": float(np.median(alone)),
+        "ratio": float(np.median(step / alone)),
+        "outside": float(np.median(step - inside)),
+        "real_time_factor": ArmPickPlace.control_period / float(np.median(coupled)),
+    }
+
+
+class _Clocked(gym.Wrapper[Any, Any, Any, Any]):
+    """Adds up the processor time of the steps below it."""
+
+    seconds = 0.0
+
+    def step(self, action: Any) -> Any:
+        start = time.thread_time()
+        result = self.env.step(action)
+        self.seconds += time.thread_time() - start
+        return result
+
+
+def _recording(task: ArmPickPlace, steps: int, tick: Callable[[], object]) -> dict[str, float]:
+    """What a recording adds to an episode, the work of its threads and its closing included."""
+    clocked = _Clocked(task)
+    with tempfile.TemporaryDirectory() as folder:
+        env = RecordRerun(clocked, Path(folder) / "benchmark.rrd")
+        observation, _ = env.reset(seed=0, options={"object": "screwdriver"})
+        opening, done = env.seconds, 0
+        policy, deciding = PickAndPlace(), 0.0
+        begin = time.process_time()
+        for _ in range(steps):
+            start = time.thread_time()
+            action = policy.act(observation)
+            deciding += time.thread_time() - start
+            observation, _, terminated, truncated, _ = env.step(action)
+            done += 1
+            tick()
+            if terminated or truncated:
+                break
+        env.close()
+        everything = time.process_time() - begin
+        size = env.path.stat().st_size
+    return {
+        "opening": opening,
+        "per_step": (env.seconds - opening) / done,
+        "share": (everything - deciding - clocked.seconds) / clocked.seconds,
+        "bytes_per_second": size / (done * task.control_period),
+    }
+
+
+def _bank(sim: Simulation, repetitions: int) -> dict[str, float]:
+    """Time of one update of all TCAs of the arm."""
+    power, length, taken = np.ones(sim.n), sim.length, []
+    for _ in range(repetitions):
+        start = time.thread_time()
+        sim.bank.advance(sim.tca, power, length, sim.tca_period)
+        taken.append(time.thread_time() - start)
+    return {"advance": float(np.median(taken))}

@@ -1,0 +1,231 @@
+"""The command ``tca-mj``. What its subcommands need is loaded when one of them runs."""
+
+import argparse
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import tca_mj
+from tca_mj.registry import TASKS
+
+OBJECTS = ("screwdriver", "pcb")
+POLICIES = ("scripted", "off", "random")
+
+_EXAMPLES = """\
+examples:
+  tca-mj demo pick-and-place                    the arm puts a screwdriver into a cup
+  tca-mj demo pick-and-place --object pcb --seed 3 --out runs/board
+  rerun runs/board/rollout.rrd                  look at what happened
+  tca-mj list                                   the tasks
+  tca-mj view TCA/ArmPickPlace-v0               watch it in a window
+  tca-mj bench --out runs/bench                 how fast it is on this machine
+"""
+
+_DEMO = """\
+Runs one scripted episode and writes into the folder --out:
+  summary.json   success, energy, peak temperatures, duration, versions, machine
+  rollout.rrd    everything over time; open it with `rerun rollout.rrd`
+  rollout.mp4    a film (needs OpenGL and `pip install 'tca-mj[demo]'`)
+  rollout.png    power, temperature, tension and bend (needs `pip install 'tca-mj[demo]'`)
+
+Exit code: 0 if the object lies in the cup, 1 if not, 2 if the command was wrong, 130 after Ctrl-C,
+which keeps what was recorded until then.
+
+examples:
+  tca-mj demo pick-and-place --object pcb
+  tca-mj demo pick-and-place --seed 7 --no-video      much faster
+"""
+
+_VIEW = """\
+Opens a window in which the task runs. Space starts and pauses, backspace begins the next episode,
+= and - change the speed, ] goes to the next camera, F1 lists all keys.
+
+Policies: scripted (the task's own), off (no power), random.
+
+examples:
+  tca-mj view TCA/ArmPickPlace-v0
+  tca-mj view TCA/ArmPickPlace-v0 --policy random --seed 1
+"""
+
+_NO_DISPLAY = """\
+tca-mj view: there is no screen to open a window on ({reason}).
+Without a screen you can
+  * record the task and look at the recording on any machine:
+      tca-mj demo pick-and-place --out runs/demo
+      rerun runs/demo/rollout.rrd
+  * log in with a remote desktop, or with X forwarding (ssh -X)
+  * run it on a screen that only exists in memory, for a test:
+      xvfb-run -s "-screen 0 1280x960x24" tca-mj view {task}\
+"""
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Runs the command line and returns its exit code.
+
+    Args:
+        argv: Arguments without the name of the program; None for those of the process.
+
+    Raises:
+        SystemExit: With code 2 if the arguments are wrong, 0 after ``--help`` or ``--version``.
+    """
+    arguments = _parser().parse_args(argv)
+    try:
+        return arguments.run(arguments)
+    except KeyboardInterrupt:
+        print("interrupted", file=sys.stderr)
+        return 130
+
+
+def _parser() -> argparse.ArgumentParser:
+    style = argparse.RawDescriptionHelpFormatter
+    parser = argparse.ArgumentParser(
+        prog="tca-mj", description=tca_mj.__doc__.splitlines()[0], epilog=_EXAMPLES,
+        formatter_class=style,
+    )
+    parser.add_argument("--version", action="version", version=f"tca-mj {tca_mj.__version__}")
+    commands = parser.add_subparsers(title="commands", required=True, metavar="COMMAND")
+
+    demo = commands.add_parser(
+        "demo", help="run a scripted demo and record it", description=_DEMO, formatter_class=style
+    )
+    demo.add_argument("name", choices=["pick-and-place"], help="which demo")
+    demo.add_argument("--object", choices=OBJECTS, default="screwdriver", help="what to pick up")
+    demo.add_argument("--seed", type=_seed, default=0, help="places of object and cup; default 0")
+    demo.add_argument("--out", type=_folder, help="folder; default runs/demo/OBJECT")
+    demo.add_argument(
+        "--video", action=argparse.BooleanOptionalAction, default=True,
+        help="make the film, which takes most of the time",
+    )
+    demo.set_defaults(run=_demo)
+
+    tasks = commands.add_parser("list", help="list the tasks, with their spaces")
+    tasks.set_defaults(run=_list)
+
+    view = commands.add_parser(
+        "view", help="watch a task in a window", description=_VIEW, formatter_class=style
+    )
+    view.add_argument("task", choices=[task.id for task in TASKS], metavar="TASK", help="its id")
+    view.add_argument("--policy", choices=POLICIES, default="scripted", help="who acts")
+    view.add_argument("--object", choices=OBJECTS, help="default: drawn at random")
+    view.add_argument("--seed", type=_seed, default=0, help="seed of the first episode; default 0")
+    view.set_defaults(run=_view)
+
+    bench = commands.add_parser("bench", help="measure the speed on this machine")
+    bench.add_argument("--out", type=_folder, help="folder for benchmark.json and benchmark.md")
+    bench.add_argument("--quick", action="store_true", help="a tenth of the measurements")
+    bench.set_defaults(run=_bench)
+    return parser
+
+
+def _seed(text: str) -> int:
+    value = int(text)
+    if value < 0:
+        raise argparse.ArgumentTypeError(f"must be at least 0, got {value}")
+    return value
+
+
+def _folder(text: str) -> Path:
+    path = Path(text)
+    if path.exists() and not path.is_dir():
+        raise argparse.ArgumentTypeError(f"must be a folder, {path} is a file")
+    return path
+
+
+def _demo(arguments: argparse.Namespace) -> int:
+    from tca_mj.agents.demo import pick_and_place
+
+    out = arguments.out or Path("runs/demo") / arguments.object
+    try:
+        summary = pick_and_place(
+            object=arguments.object, seed=arguments.seed, out=out, video=arguments.video
+        )
+    except KeyboardInterrupt:
+        print(f"interrupted; what was recorded is in {out}", file=sys.stderr)
+        return 130
+    print(outcome(summary))
+    for name in ["summary.json", *summary["files"]]:
+        print(f"  {out / name}")
+    return 0 if summary["success"] else 1
+
+
+def outcome(summary: dict[str, Any]) -> str:
+    """One line on how a demo ended, from its summary."""
+    where = "is in the cup" if summary["success"] else "is not in the cup"
+    return (
+        f"the {summary['object']} {where} ({summary['ending']}) after"
+        f" {summary['duration']:.1f} s, {sum(summary['energy'].values()):.0f} J,"
+        f" at most {max(summary['peak_temperature'].values()):.0f} °C;"
+        f" simulated at {summary['real_time_factor']:.1f} times real time"
+    )
+
+
+def _list(arguments: argparse.Namespace) -> int:
+    import gymnasium
+
+    for task in TASKS:
+        env = gymnasium.make(task.id, disable_env_checker=True)
+        about = (type(env.unwrapped).__doc__ or "").strip().partition("\n")[0]
+        print(task.id)
+        print(f"    {about}")
+        print(f"    action {env.action_space.shape}, observation {env.observation_space.shape}")
+        env.close()
+    return 0
+
+
+def _view(arguments: argparse.Namespace) -> int:
+    from tca_mj.envs.viewer import NoDisplay, launch, need_display
+
+    try:
+        need_display()
+    except NoDisplay as error:
+        print(_NO_DISPLAY.format(reason=error, task=arguments.task), file=sys.stderr)
+        return 2
+    import gymnasium
+
+    env = gymnasium.make(arguments.task)
+    options = {"object": arguments.object} if arguments.object else None
+    print("space starts and pauses, backspace begins the next episode, F1 lists all keys")
+    launch(
+        env, _policy(arguments.policy, env, arguments.seed), seed=arguments.seed, options=options,
+        title=arguments.task,
+    )
+    return 0
+
+
+def _policy(name: str, env: Any, seed: int) -> Any:
+    """A policy for the viewer."""
+    from importlib import import_module
+
+    import numpy as np
+
+    from tca_mj.agents.scripted import PickAndPlace
+    from tca_mj.envs.viewer import ViewerPolicy
+
+    if name == "scripted":
+        script = PickAndPlace()
+        return ViewerPolicy(script.act, script.reset)
+    if name == "random":
+        env.action_space.seed(seed)
+        return ViewerPolicy(lambda observation: env.action_space.sample())
+    # No power, and everything else in the middle of its range.
+    table = import_module(type(env.unwrapped).__module__).ACTION
+    space = env.action_space
+    still = np.array(0.5 * (space.low + space.high), dtype=space.dtype)
+    for entry in table.entries:
+        if "power" in entry.name:
+            still[table.slices[entry.name]] = space.low[table.slices[entry.name]]
+    return ViewerPolicy(lambda observation: still)
+
+
+def _bench(arguments: argparse.Namespace) -> int:
+    from tca_mj.bench import benchmark, report
+
+    print(report(benchmark(scale=0.1 if arguments.quick else 1.0, out=arguments.out)))
+    if arguments.out:
+        print(f"\n{arguments.out / 'benchmark.md'}\n{arguments.out / 'benchmark.json'}")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,33 @@
+"""What a result was made with: the versions and the machine, to be written beside it."""
+
+import os
+import platform
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+
+# Distributions whose version changes results or files.
+RELEVANT = ("tca-mj", "mujoco", "gymnasium", "numpy", "rerun-sdk")
+
+
+def versions() -> dict[str, str]:
+    """Versions of Python and of the packages that results depend on, by name."""
+    found = {"python": platform.python_version()}
+    for name in RELEVANT:
+        try:
+            found[name] = version(name)
+        except PackageNotFoundError:
+            found[name] = "not installed"
+    return found
+
+
+def machine() -> dict[str, str | int]:
+    """The processor's model, the number of cores this process may use, and the system."""
+    model = platform.processor() or platform.machine()
+    information = Path("/proc/cpuinfo")
+    if information.is_file():
+        for line in information.read_text(encoding="utf-8", errors="replace").splitlines():
+            if line.startswith("model name"):
+                model = line.partition(":")[2].strip()
+                break
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
+    return {"cpu": model, "cores": cores or 1, "system": platform.platform()}
