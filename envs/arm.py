@@ -84,7 +84,7 @@ class ArmPickPlace(gym.Env[Observation, Action]):
     the simulation diverged.
     """
 
-    metadata: ClassVar[dict[str, Any]] = {"render_modes": ["rgb_array"], "render_fps": 10}
+    metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 10}
     max_power: ClassVar[NDArray[np.float64]] = np.array([2.0, 2.0, 2.0, 28.0, 10.0])  # [W]
     max_temperature = 180.0  # annealing temperature of the TCAs, Sun, Table 2.1 [°C]
     control_period = 0.1  # [s]
@@ -119,7 +119,7 @@ class ArmPickPlace(gym.Env[Observation, Action]):
                 f"render_mode must be None or one of {self.metadata['render_modes']},"
                 f" got {render_mode!r}"
             )
-        self.render_mode = render_mode
+        self.render_mode: str | None = render_mode
         self.arm_spec = arm_spec or ArmSpec()
         files = ["cup", *(name for kind in OBJECTS for name in (kind, f"{kind}_stand"))]
         part = scene(
@@ -130,17 +130,19 @@ class ArmPickPlace(gym.Env[Observation, Action]):
         self.action_space = ACTION.space
         self._camera, self._size = camera, size
         self._screen: Offscreen | None = None
-        self._arguments = (render_mode, arm_spec, timestep, camera, size)
         self.object = "screwdriver"
         self._find(self.model)
 
     def _find(self, model: mujoco.MjModel) -> None:
-        """Looks up the ids of what is observed and set."""
-        self._lift = model.joint("arm.lift")
-        self._grasp = model.site("arm.gripper.grasp").id
-        self._tips = [model.site(f"arm.gripper.tip{i}").id for i in range(2)]
-        self._free = {k: model.joint(f"{k}.free") for k in OBJECTS}
-        self._body = {k: model.body(f"{k}.{k}").id for k in OBJECTS}
+        """Looks up the addresses of what is observed and set."""
+        lift = model.joint("arm.lift").id
+        self._lift_q, self._lift_v = int(model.jnt_qposadr[lift]), int(model.jnt_dofadr[lift])
+        self._grasp = int(model.site("arm.gripper.grasp").id)
+        self._tips = [int(model.site(f"arm.gripper.tip{i}").id) for i in range(2)]
+        free = {kind: model.joint(f"{kind}.free").id for kind in OBJECTS}
+        self._free_q = {kind: int(model.jnt_qposadr[i]) for kind, i in free.items()}
+        self._free_v = {kind: int(model.jnt_dofadr[i]) for kind, i in free.items()}
+        self._body = {kind: int(model.body(f"{kind}.{kind}").id) for kind in OBJECTS}
         self._stand = {k: int(model.body(f"{k}_stand.{k}_stand").mocapid[0]) for k in OBJECTS}
         self._cup = int(model.body("cup.cup").mocapid[0])
         names = [model.body(int(b)).name for b in model.geom_bodyid]
@@ -173,15 +175,15 @@ class ArmPickPlace(gym.Env[Observation, Action]):
         super().reset(seed=seed)
         setup = self._setup(options or {})
         self.object = setup["object"]
-        self.sim.reset()
-        data = self.data
-        data.qpos[self._lift.qposadr] = self.arm_spec.height
-        data.act[0] = self.arm_spec.height
         parked = next(kind for kind in OBJECTS if kind != self.object)
-        self._place(parked, np.array(_PARKED), 0.0)
-        self._place(self.object, setup["object_position"], setup["object_yaw"])
-        data.mocap_pos[self._cup] = [*setup["cup_position"], 0.0]
-        mujoco.mj_forward(self.model, data)
+
+        def place(data: mujoco.MjData) -> None:
+            data.qpos[self._lift_q] = data.act[0] = self.arm_spec.height
+            self._place(data, parked, _PARKED, 0.0)
+            self._place(data, self.object, setup["object_position"], setup["object_yaw"])
+            data.mocap_pos[self._cup] = [*setup["cup_position"], 0.0]
+
+        self.sim.reset(place)
         self._in_cup, self._carried = 0, False
         return self._observe(), {"object": self.object, **self._info()}
 
@@ -193,7 +195,7 @@ class ArmPickPlace(gym.Env[Observation, Action]):
         yaw = random.uniform(*self.yaw_range)
         angle = np.pi + random.uniform(-self.cup_angle, self.cup_angle)
         distance = random.uniform(*self.cup_range)
-        drawn = {
+        drawn: dict[str, Any] = {
             "object": kind,
             "object_position": position,
             "object_yaw": yaw,
@@ -218,7 +220,8 @@ class ArmPickPlace(gym.Env[Observation, Action]):
         low, high = self.yaw_range
         if not low <= float(setup["object_yaw"]) <= high:
             raise ValueError(
-                f"object_yaw must be between {low:.4f} and {high:.4f} rad, got {setup['object_yaw']}"
+                f"object_yaw must be between {low:.4f} and {high:.4f} rad,"
+                f" got {setup['object_yaw']}"
             )
         distance = float(np.hypot(*setup["cup_position"]))
         if not self.cup_range[0] - 1e-9 <= distance <= self.cup_range[1] + 1e-9:
@@ -228,14 +231,14 @@ class ArmPickPlace(gym.Env[Observation, Action]):
             )
         return setup
 
-    def _place(self, kind: str, position: ArrayLike, yaw: float) -> None:
+    def _place(self, data: mujoco.MjData, kind: str, position: ArrayLike, yaw: float) -> None:
         """Puts an object onto its stand and both where they belong."""
         pose = np.array([*np.asarray(position), _STAND])
         turn = np.array([np.cos(yaw / 2.0), 0.0, 0.0, np.sin(yaw / 2.0)])
-        self.data.mocap_pos[self._stand[kind]] = pose
-        self.data.mocap_quat[self._stand[kind]] = turn
-        start = int(self._free[kind].qposadr[0])
-        self.data.qpos[start : start + 7] = [*pose, *turn]
+        data.mocap_pos[self._stand[kind]] = pose
+        data.mocap_quat[self._stand[kind]] = turn
+        start = self._free_q[kind]
+        data.qpos[start : start + 7] = [*pose, *turn]
 
     def step(self, action: Action) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
         """Heats and moves for ``control_period``; see the class.
@@ -290,12 +293,12 @@ class ArmPickPlace(gym.Env[Observation, Action]):
         tips = data.site_xpos[self._tips]
         turn = np.empty(4)
         mujoco.mju_mat2Quat(turn, data.site_xmat[self._grasp])
-        dofs = int(self._free[self.object].dofadr[0])
+        dofs = self._free_v[self.object]
         object_turn = data.xquat[self._body[self.object]]
         return OBSERVATION.pack(
             {
-                "base height": data.qpos[self._lift.qposadr],
-                "base velocity": data.qvel[self._lift.dofadr],
+                "base height": data.qpos[self._lift_q],
+                "base velocity": data.qvel[self._lift_v],
                 "TCA temperature": sim.temperature,
                 "TCA length": sim.length,
                 "TCA tension": sim.tension,
@@ -334,7 +337,8 @@ class ArmPickPlace(gym.Env[Observation, Action]):
         position, cup = seen["object position"], seen["cup position"]
         aside = float(np.hypot(*(position - cup)[:2]))
         inside = aside < _CUP_RADIUS and position[2] < _CUP_RIM
-        rests = inside and self._carried and np.linalg.norm(seen["object velocity"]) < 0.02 and not self._touched()
+        still = bool(np.linalg.norm(seen["object velocity"]) < 0.02)
+        rests = inside and still and self._carried and not self._touched()
         gap = float(np.linalg.norm(position - seen["gripper position"]))
         near = float(rewards.tolerance(gap, bounds=(0.0, 4e-3), margin=0.05))
         over = float(rewards.tolerance(aside, bounds=(0.0, 8e-3), margin=0.03))
@@ -362,7 +366,7 @@ class ArmPickPlace(gym.Env[Observation, Action]):
             "tension": sim.tension.copy(),
         }
 
-    def render(self) -> NDArray[np.uint8] | None:  # type: ignore[override]
+    def render(self) -> NDArray[np.uint8] | None:
         """A picture of the scene, shape (height, width, 3), or None without a render mode.
 
         Raises:
@@ -375,6 +379,10 @@ class ArmPickPlace(gym.Env[Observation, Action]):
             self._screen = Offscreen(self.model, width=width, height=height, camera=self._camera)
         colour_tendons(self.model, self.sim.tendon, self.sim.temperature)
         return self._screen.draw(self.data)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Everything but the window: a copy goes on where this one is."""
+        return self.__dict__ | {"_screen": None}
 
     def close(self) -> None:
         """Frees what rendering took."""

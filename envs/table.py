@@ -49,8 +49,8 @@ class Table:
         self._high = np.repeat([e.high for e in self.entries], [e.size for e in self.entries])
 
     @property
-    def space(self) -> Box:
-        """The table as a Gymnasium space."""
+    def space(self) -> Any:
+        """The table as a Gymnasium ``Box`` of float32."""
         return Box(self._low.astype(np.float32), self._high.astype(np.float32), dtype=np.float32)
 
     def pack(self, values: dict[str, ArrayLike]) -> NDArray[np.float32]:

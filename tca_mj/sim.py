@@ -3,8 +3,13 @@
 The TCAs' law F(l, T) is evaluated once per ``tca_period`` and handed to MuJoCo linearised in the
 length, F + k (l' - l), as a native actuator that MuJoCo evaluates in every physics step. Holding
 the tension constant instead would make a stiff TCA a delayed spring, which oscillates.
+
+The tendons are polylines through sites. Each TCA's length is that of the smooth curve which its
+polyline stands for, l + ½ Σ c θ², with the coefficients c of ``RoutedTca.stiffening``; the joints
+get the matching springs c F, so that the tension does the work that the length says.
 """
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import mujoco
@@ -74,7 +79,6 @@ class Simulation:
         self._actuator = np.array(
             [model.actuator(name).id for name in self.tca_names], dtype=np.int64
         )
-        self._zero_gain = model.actuator_biasprm[self._actuator].copy()
 
         # Joints whose stiffness depends on the tensions: k = k0 + coupling @ tension.
         joints = sorted({model.joint(j).id for tca in part.tcas for j, _ in tca.stiffening})
@@ -89,33 +93,41 @@ class Simulation:
         self._spring = model.qpos_spring[self._joint_qpos].copy()
 
         # The bodies' unloaded shape is that of their springs; TCAs are measured from there.
-        hinges = model.jnt_type >= int(mujoco.mjtJoint.mjJNT_SLIDE)
-        address = model.jnt_qposadr[hinges]
+        scalar = model.jnt_type >= int(mujoco.mjtJoint.mjJNT_SLIDE)
+        address = model.jnt_qposadr[scalar]
         self.data.qpos[address] = model.qpos_spring[address]
-        mujoco.mj_kinematics(model, self.data)
-        mujoco.mj_comPos(model, self.data)
-        mujoco.mj_tendon(model, self.data)
-        unloaded = self.data.ten_length[self.tendon]
-        rest = np.array([tca.spec.rest_length + tca.stretch for tca in part.tcas])
-        self._length_offset = rest - unloaded
         self._start = self.data.qpos.copy()
+        self._locate()
+        rest = np.array([tca.spec.rest_length + tca.stretch for tca in part.tcas])
+        self._length_offset = np.zeros(self.n)
+        self._length_offset = rest - self.length
         self.tca: TcaState
         self.pull: Pull
         self.reset()
 
-    def reset(self) -> None:
-        """Back to the unloaded shape at ambient temperature, whatever happened before."""
+    def reset(self, place: Callable[[mujoco.MjData], None] | None = None) -> None:
+        """Back to the unloaded shape at ambient temperature, whatever happened before.
+
+        Args:
+            place: Called with the data to put the robot and its objects where they start, before
+                anything is computed from it.
+        """
         model, data = self.model, self.data
         mujoco.mj_resetData(model, data)
         data.qpos[:] = self._start
-        model.actuator_biasprm[self._actuator] = self._zero_gain
-        model.jnt_stiffness[self._joint] = self._stiffness
-        model.qpos_spring[self._joint_qpos] = self._spring
+        if place is not None:
+            place(data)
         self.tca = self.bank.rest()
         self.power = np.zeros(self.n)
-        mujoco.mj_forward(model, data)
+        self._locate()
         self._hand_over(self.bank.pull(self.tca, self.length))
         mujoco.mj_forward(model, data)
+
+    def _locate(self) -> None:
+        """Computes positions and tendon lengths, and no more, from the joints."""
+        mujoco.mj_kinematics(self.model, self.data)
+        mujoco.mj_comPos(self.model, self.data)
+        mujoco.mj_tendon(self.model, self.data)
 
     @property
     def n(self) -> int:
@@ -135,12 +147,14 @@ class Simulation:
     @property
     def length(self) -> NDArray[np.float64]:
         """Length of each TCA along its route, shape (n,) [m]."""
-        return self.data.ten_length[self.tendon] + self._length_offset
+        angle = self.data.qpos[self._joint_qpos]
+        smooth = 0.5 * ((angle * angle) @ self._coupling)
+        return self.data.ten_length[self.tendon] + smooth + self._length_offset
 
     @property
     def tension(self) -> NDArray[np.float64]:
         """Tension each TCA exerts on the body, shape (n,) [N]; a slack TCA has none."""
-        return -self.data.actuator_force[self._actuator]
+        return 0.0 - self.data.actuator_force[self._actuator]
 
     @property
     def resistance(self) -> NDArray[np.float64]:
@@ -186,7 +200,7 @@ class Simulation:
         """Gives MuJoCo the law F + k (l' - l) and the chains the stiffness they are owed."""
         self.pull = pull
         model = self.model
-        tendon_length = pull.length - self._length_offset
+        tendon_length = self.data.ten_length[self.tendon]
         bias = model.actuator_biasprm
         bias[self._actuator, 0] = -pull.tension + pull.stiffness * tendon_length
         bias[self._actuator, 1] = -pull.stiffness

@@ -235,17 +235,16 @@ def test_the_elastica():
 
 @pytest.mark.parametrize("nodes", [4, 8])
 def test_a_curved_body_rests_on_its_circle(nodes):
-    """A chain bent by θ per node touches a circle smaller by (θ/2)/tan(θ/2): second order.
+    """The pieces are the sides of a polygon about the arc: exact at the ends of the cells.
 
     A TCA on the outside is longer than the body by u a L, whatever the number of nodes.
     """
     bent = replace(BEAM, length=17.5e-3, curvature=(0.0, -170.0, 0.0))
     shape = settle(bent, [Helix(2.5e-3)], [0.0], nodes=nodes)
     angle = 170.0 * 17.5e-3
-    half = angle / nodes / 2.0
     circle = np.array([math.cos(angle) - 1.0, 0.0, math.sin(angle)]) / 170.0
     assert shape.bend_angle == pytest.approx(angle)
-    assert shape.tip == pytest.approx(half / math.tan(half) * circle, abs=1e-12)
+    assert shape.tip == pytest.approx(circle, abs=1e-12)
     assert shape.tca_length[0] == pytest.approx(17.5e-3 * (1.0 + 170.0 * 2.5e-3), rel=1e-12)
     assert shape.strain == pytest.approx(np.tile([0.0, -170.0, 0, 0, 0, 1], (nodes + 1, 1)))
 

@@ -290,7 +290,7 @@ def test_the_arm_hangs_from_its_base_and_moves_with_it():
         (lambda: bending_module(BendingSpec(nodes=0)), "nodes must be at least 1, got 0"),
         (lambda: bending_module(BendingSpec(offset=-1e-3)), "radius must be at least 0 m"),
         (lambda: twisting_module(TwistingSpec(nodes=6)), "four sites per turn, got 2.40"),
-        (lambda: twisting_module(TwistingSpec(double=False)), "four sites per turn, got 2.40"),
+        (lambda: twisting_module(TwistingSpec(double=False)), "four sites per turn, got 2.00"),
         (lambda: twisting_module(TwistingSpec(radius=6e-3)), r"route of tca must stay inside"),
         (lambda: twisting_module(TwistingSpec(length=math.nan)), "length must be .* got nan"),
         (

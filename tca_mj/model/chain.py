@@ -36,6 +36,8 @@ class Chain:
         name: Prefix of all names of the chain.
         beam: What was built.
         cell: Length h of a cell [m].
+        piece: Length of a whole piece, h or, in a curved beam, the side of the polygon about the
+            unloaded arc [m].
         motions: Which motions each node has.
         pieces: The n + 1 rigid pieces from base to tip.
         points: Positions along the beam, 0 to L, of the pieces' middles: the base, the cells'
@@ -46,6 +48,7 @@ class Chain:
     name: str
     beam: BeamSpec
     cell: float
+    piece: float
     motions: tuple[Motion, ...]
     pieces: tuple[mujoco.MjsBody, ...]
     points: NDArray[np.float64]
@@ -58,12 +61,12 @@ class Chain:
 
     @property
     def tip(self) -> mujoco.MjsBody:
-        """The last piece; its frame sits at the last node, the tip is h/2 further along z."""
+        """The last piece; its frame sits at the last node, the tip is half a piece further."""
         return self.pieces[-1]
 
     def local(self, piece: int) -> float:
         """z of the piece's point in the piece's own frame [m]."""
-        return 0.0 if piece == 0 else self.cell / 2.0
+        return 0.0 if piece == 0 else self.piece / 2.0
 
 
 def beam(
@@ -106,22 +109,30 @@ def beam(
         raise ValueError(f"motions must be some of {MOTIONS}, got {tuple(motions)}")
     kept: tuple[Motion, ...] = tuple(motion for motion in MOTIONS if motion in motions)
     cell = spec.length / nodes
-    look = _Look(spec, tuple(rgba), tuple(friction), collide)
+    half_turn = 0.5 * cell * float(np.linalg.norm(spec.curvature[:2]))
+    if half_turn > 0.4 * np.pi:
+        raise ValueError(f"nodes must be at least {int(np.ceil(nodes * half_turn / 0.4 / np.pi))}"
+                         f" for the curvature {spec.curvature}, got {nodes}")  # fmt: skip
+    # Pieces of length h would put the nodes on a smaller circle than the beam's.
+    length = cell if half_turn == 0.0 else cell * float(np.tan(half_turn)) / half_turn
+    look = _Look(spec, nodes, tuple(rgba), tuple(friction), collide)
 
     piece = parent.add_body(name=f"{name}.piece0", pos=list(pos), quat=list(quat))
-    look.dress(piece, cell / 2.0, f"{name}.skin0")
+    look.dress(piece, length / 2.0, 0.5, f"{name}.skin0")
     pieces, joints = [piece], []
     for node in range(nodes):
-        reach = cell / 2.0 if node == 0 else cell
+        reach = length / 2.0 if node == 0 else length
         piece = piece.add_body(name=f"{name}.piece{node + 1}", pos=[0.0, 0.0, reach])
         order = kept if node % 2 == 0 else kept[::-1]
         joints.append({m: _add_joint(piece, spec, cell, m, f"{name}.{m}{node}") for m in order})
-        look.dress(piece, cell if node < nodes - 1 else cell / 2.0, f"{name}.skin{node + 1}")
+        share = 1.0 if node < nodes - 1 else 0.5
+        look.dress(piece, share * length, share, f"{name}.skin{node + 1}")
         pieces.append(piece)
     return Chain(
         name=name,
         beam=spec,
         cell=cell,
+        piece=length,
         motions=kept,
         pieces=tuple(pieces),
         points=np.linspace(0.0, spec.length, nodes + 1),
@@ -155,11 +166,12 @@ class _Look:
     """Mass, shape and surface of the pieces."""
 
     spec: BeamSpec
+    nodes: int
     rgba: tuple[float, ...]
     friction: tuple[float, ...]
     collide: bool
 
-    def dress(self, body: mujoco.MjsBody, length: float, name: str) -> None:
+    def dress(self, body: mujoco.MjsBody, length: float, cells: float, name: str) -> None:
         outline = self.spec.outline
         half = length / 2.0
         if outline.round:
@@ -173,7 +185,7 @@ class _Look:
             type=shape,
             size=size,
             pos=[0.0, 0.0, half],
-            mass=self.spec.line_density * length,
+            mass=self.spec.mass / self.nodes * cells,
             rgba=list(self.rgba),
             friction=list(self.friction),
             contype=0,

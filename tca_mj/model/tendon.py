@@ -212,8 +212,9 @@ def _stiffening(
         inside = range(int(held[k]), int(held[k + 1]))  # nodes between two neighbouring sites
         for node in inside:
             height = (node + 0.5) * chain.cell
-            below = np.array([*offsets[k], points[held[k]] - height])
-            above = np.array([*offsets[k + 1], points[held[k + 1]] - height])
+            scale = chain.piece / chain.cell
+            below = np.array([*offsets[k], scale * (points[held[k]] - height)])
+            above = np.array([*offsets[k + 1], scale * (points[held[k + 1]] - height)])
             for motion in _BEND:
                 if motion in chain.joints[node]:
                     axis = 0 if motion == "bend_x" else 1

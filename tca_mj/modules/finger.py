@@ -55,7 +55,7 @@ class FingerPairSpec:
     offset: float = 2.5e-3
     half_width: float = 1.5e-3
     closure: float = math.pi
-    nodes: int = 5
+    nodes: int = 6
     friction: float = 1.0
     tca: TcaSpec = field(default_factory=lambda: CATALOGUE["free-stroke"])
     sheath_capacity: float = 0.06

@@ -126,10 +126,11 @@ class BeamSpec:
         """
         _require_positive(length=length, diameter=diameter, young=young, shear=shear,
                           density=density)  # fmt: skip
+        outer = diameter if outer_diameter is None else outer_diameter
+        _require_positive(outer_diameter=outer)
         area = np.pi * diameter**2 / 4.0
         inertia = np.pi * diameter**4 / 64.0
-        radius = (diameter if outer_diameter is None else outer_diameter) / 2.0
-        outline = Outline(radius, radius)
+        outline = Outline(outer / 2.0, outer / 2.0)
         return cls(
             length=length,
             bending=(young * inertia, young * inertia),
