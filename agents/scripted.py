@@ -124,7 +124,7 @@ class PickAndPlace:
                 return "open"
             case "open" if seen.opening > seen.width + 0.9 * gains.clearance or late:
                 return "lower"
-            case "lower" if abs(seen.gripper[2] - self._height) < 5e-4 or late:
+            case "lower" if abs(seen.tips - self._height) < 4e-4 or late:
                 return "pinch"
             case "pinch" if self._calm > 0.8 or seen.temperature[_GRIPPER] < 50.0:
                 return "lift"
@@ -195,7 +195,7 @@ class PickAndPlace:
         """Velocity of the base [m/s]."""
         match self.phase:
             case "lower":
-                return 1.2 * (self._height - seen.gripper[2])
+                return 1.5 * (self._height - seen.tips)
             case "pinch":
                 return 0.0
             case "lift" | "turn back":
@@ -246,6 +246,7 @@ class _Seen:
         self.opening = float(rows["gripper opening"][0])
         self.width = float(rows["object width"][0])
         self.gripper = rows["gripper position"]
+        self.tips = float(self.gripper[2])  # their height now; the positions become averages
         self.object = rows["object position"]
         self.cup = rows["cup position"]
         # The fingers close along the gripper's x axis; neutral is the world's x axis.
