@@ -40,6 +40,8 @@ class PickAndPlaceGains:
         aligned: Offset of the gripper with which it goes down [m].
         aligned_yaw: Misalignment of the wrist with which it goes down [rad].
         over_cup: Offset of the object from the cup's axis at which it is let go [m].
+        patience: Time after which half as much again is near enough: the arm cannot reach
+            further without getting too hot [s].
         carry_height: Height of the object while it is carried [m].
         drop_height: Height of the object when it is let go [m].
     """
@@ -57,8 +59,9 @@ class PickAndPlaceGains:
     aligned: float = 1.0e-3
     aligned_yaw: float = 0.07
     over_cup: float = 6e-3
+    patience: float = 12.0
     carry_height: float = 45e-3
-    drop_height: float = 30e-3
+    drop_height: float = 27e-3
 
 
 @dataclass(slots=True)
@@ -135,7 +138,8 @@ class PickAndPlace:
             case "turn back" if abs(seen.yaw) < 0.2 or late:
                 return "bend"
             case "bend" if (
-                float(np.linalg.norm(seen.object[:2] - seen.cup[:2])) < gains.over_cup
+                float(np.linalg.norm(seen.object[:2] - seen.cup[:2]))
+                < gains.over_cup * (1.0 if self.since < gains.patience else 1.5)
                 and seen.object[2] < gains.drop_height + 2e-3
             ) or late:
                 return "release"

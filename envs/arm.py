@@ -45,7 +45,7 @@ ACTION = Table([Entry("TCA power", 5, -1.0, 1.0, "-"), Entry("base velocity", 1,
 
 _STAND = 25e-3  # height of the objects' centres on their stands [m]
 _LIFTED = 8e-3  # height above the stand at which an object counts as carried [m]
-_PARKED = (0.09, 0.08)  # where the object that is not used stands [m]
+_PARKED = (0.06, 0.05)  # where the object that is not used stands [m]
 _CUP_RADIUS, _CUP_RIM = 12.5e-3, 16e-3  # of assets/mjcf/cup.xml [m]
 
 

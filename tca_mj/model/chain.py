@@ -78,7 +78,7 @@ def beam(
     motions: Sequence[Motion] = MOTIONS,
     pos: Sequence[float] = (0.0, 0.0, 0.0),
     quat: Sequence[float] = (1.0, 0.0, 0.0, 0.0),
-    rgba: Sequence[float] = (0.93, 0.89, 0.82, 0.45),
+    rgba: Sequence[float] = (0.95, 0.91, 0.85, 0.35),
     friction: Sequence[float] = (1.0, 0.005, 0.0001),
     collide: bool = True,
 ) -> Chain:

@@ -72,7 +72,6 @@ def route_tca(
     name: str,
     sites: int | None = None,
     stretch: float = 0.0,
-    width: float = 4e-4,
 ) -> RoutedTca:
     """Lays a TCA along passes through chains and gives it a tendon and an actuator.
 
@@ -86,7 +85,6 @@ def route_tca(
         name: Its name.
         sites: Points on each chain that hold the TCA, base and tip included; by default all.
         stretch: Pre-stretch [m].
-        width: Radius of the drawn line [m].
 
     Returns:
         The routed TCA.
@@ -103,6 +101,7 @@ def route_tca(
             f"rest_length + stretch of {name} must be its route's length {length:.6f} m,"
             f" got {tca.rest_length + stretch:.6f} m"
         )
+    width = tca.coil_radius + tca.fibre.radius  # as thick as the coil
     tendon = spec.add_tendon(name=name, width=width, rgba=[0.1, 0.2, 0.6, 1.0])
     stiffening: dict[str, float] = {}
     for index, item in enumerate(passes):

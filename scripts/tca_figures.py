@@ -1,0 +1,120 @@
+"""Draws the figures of docs/tca.md, docs/pictures/tca_*.png; --tables prints tables instead."""
+
+import argparse
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from matplotlib.figure import Figure
+from scipy.optimize import brentq
+
+from tca_mj.modules.twisting import twisting_module
+from tca_mj.plots import temperature_colour
+from tca_mj.tca import CATALOGUE, CoilRods, TcaSpec, coil_tension, step_temperature
+
+COLOURS = {"type-0-180": "#56b4e9", "type-1-180": "#0072b2", "type-2-200": "#009e73",
+           "free-stroke": "#d55e00", "self-coiled": "#8a4fa3"}  # fmt: skip
+CASES = (  # TCA, load [g], final temperature [°C], reported contraction
+    ("type-0-180", 0, 150, "4 mm"), ("type-1-180", 0, 150, "20 mm"),
+    ("type-0-180", 40, 150, "24 mm"), ("type-1-180", 40, 150, "44 mm"),
+    ("type-2-200", 10, 160, "55 %"), ("type-2-200", 10, 220, "55 %"),
+    ("free-stroke", 30, 160, "-"), ("free-stroke", 60, 160, "-"))  # fmt: skip
+
+
+def held_length(spec: TcaSpec, temperature: float, load: float = 0.0) -> float:
+    """Length at which the TCA carries ``load`` [N]."""
+    ends = 0.55 * spec.minimum_length, 0.97 * spec.fibre_length
+    return float(brentq(lambda at: coil_tension(spec, at, temperature)[0] - load, *ends))
+
+
+def tables() -> tuple[str, str]:
+    """The catalogue, and contractions under load, in Markdown."""
+    rows = ["| TCA | rest length [mm] | minimum length [mm] | free stroke [%] | coils | mass [mg] |"
+            " heat capacity [mJ/K] | time constant [s] | cold stiffness [N/m] |"
+            " blocked force at 125 °C [mN] |", "|---" * 10 + "|"]  # fmt: skip
+    for name, s in CATALOGUE.items():
+        numbers = (f"{1e3 * s.rest_length:.1f}", f"{1e3 * s.minimum_length:.1f}",
+                   f"{100.0 * (1.0 - s.minimum_length / s.rest_length):.1f}", f"{s.coils:.0f}",
+                   f"{1e6 * s.mass:.1f}", f"{1e3 * s.heat.capacity:.1f}",
+                   f"{s.heat.time_constant:.1f}", f"{CoilRods([s]).rest_stiffness[0]:.1f}",
+                   f"{1e3 * coil_tension(s, s.rest_length, 125.0)[0]:.0f}")  # fmt: skip
+        rows.append(f"| `{name}` | {' | '.join(numbers)} |")
+    lines = ["| TCA | load | 25 °C to | reported | cold section | hot section |", "|---" * 6 + "|"]
+    for name, grams, hot, reported in CASES:
+        lines.append(f"| `{name}` | {grams} g | {hot} °C | {reported} |")
+        for section in ("cold", "hot"):
+            s = replace(CATALOGUE[name], fibre=replace(CATALOGUE[name].fibre, section=section))
+            start, end = (held_length(s, at, 9.81e-3 * grams) for at in (25.0, hot))
+            lines[-1] += f" {1e3 * (start - end):.1f} mm, {100.0 * (1.0 - end / start):.0f} % |"
+    return "\n".join(rows), "\n".join(lines)
+
+
+def draw_tension(figure: Figure) -> None:
+    spec, axis, length = CATALOGUE["free-stroke"], figure.subplots(), np.linspace(24, 72, 1500)
+    axis.set(xlabel="length [mm]", ylabel="tension [N]", xlim=(24, 72), ylim=(-0.09, 0.85))
+    axis.axvspan(24, 1e3 * spec.minimum_length, color="#ececec")
+    axis.axhspan(-0.09, 0, color="#f7efe2")
+    for hot in (175, 150, 125, 100, 75, 25):
+        force, colour = coil_tension(spec, 1e-3 * length, hot)[0], temperature_colour(hot)
+        label = f"{hot} °C" + (", extrapolated" if hot > spec.fibre.temperature_range[1] else "")
+        axis.plot(length, np.where(force > 0, force, np.nan), color=colour, lw=2, label=label)
+        axis.plot(length, np.where(force < 0, force, np.nan), ":", color=colour, lw=1.2)
+        axis.plot(1e3 * held_length(spec, hot), 0.0, "o", color=colour, ms=5, zorder=3)
+    axis.axhline(spec.breaking_force, color="#333333", lw=1, ls="--")
+    axis.axvline(1e3 * spec.rest_length, color="#333333", lw=1, ls="--")
+    for x, y, text in ((24.5, 0.5, "coils touch"), (50, -0.055, "slack: the body feels no force"),
+                       (45.4, 0.72, "rest length"), (24.5, 0.795, "breaks")):  # fmt: skip
+        axis.text(x, y, text, fontsize=9)
+    axis.legend(loc="lower right", bbox_to_anchor=(1.01, 0.085), frameon=False)
+
+
+def draw_stroke(figure: Figure) -> None:
+    (left, right), hot = figure.subplots(1, 2), np.linspace(25.0, 200.0, 141)
+    for name, colour in COLOURS.items():
+        spec = CATALOGUE[name]
+        free = [100.0 * held_length(spec, at) / spec.rest_length for at in hot]
+        left.plot(hot, free, color=colour, lw=2, label=name)
+        right.plot(hot, coil_tension(spec, spec.rest_length, hot)[0], color=colour, lw=2)
+    for axis, label in ((left, "unloaded length / rest length [%]"),
+                        (right, "blocked force at the rest length [N]")):  # fmt: skip
+        axis.set(xlabel="temperature [°C]", ylabel=label, xlim=(25.0, 200.0))
+        axis.axvspan(160.0, 200.0, color="#ececec")
+        axis.set_title("extrapolated", fontsize=9, loc="right")
+    left.legend(loc="lower left", frameon=False)
+
+
+def draw_heat(figure: Figure) -> None:
+    axis, sheathed, time = figure.subplots(), twisting_module().tcas[0].spec, np.arange(1501) / 10.0
+    axis.set(xlabel="time [s]", ylabel="temperature [°C]", xlim=(0, 150), ylim=(20, 105))
+    axis.axvspan(0, 60, color="#f7efe2")
+    bare = replace(sheathed, sheath_capacity=0.0, sheath_area=None)
+    for spec, colour, name in ((bare, "#d55e00", "bare"), (sheathed, "#0072b2", "in its sheath")):
+        course, tau = [25.0], float(spec.heat.time_constant)
+        for start in time[:-1]:
+            course.append(float(step_temperature(course[-1], 2.0 * (start < 60), spec.heat, 0.1)))
+        axis.plot(time, course, color=colour, lw=2, label=f"{name}, time constant {tau:.1f} s")
+        marks = np.array([tau, 60.0 + tau])
+        axis.plot(marks, np.interp(marks, time, course), "o", color=colour)
+    axis.text(30, 100, "2 W", fontsize=9, ha="center")
+    axis.text(105, 100, "off; a dot stands after one time constant", fontsize=9, ha="center")
+    axis.legend(loc="center right", frameon=False)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--out", type=Path, default=Path(__file__).parents[1] / "docs/pictures")
+    parser.add_argument("--tables", action="store_true", help="print the tables, draw nothing")
+    args = parser.parse_args()
+    if args.tables:
+        return print(*tables(), sep="\n\n")
+    args.out.mkdir(parents=True, exist_ok=True)
+    for draw in (draw_tension, draw_stroke, draw_heat):
+        draw(figure := Figure(figsize=(8.0, 4.3), layout="constrained"))
+        for axis in figure.axes:
+            axis.grid(color="#e6e6e6")
+            axis.spines[["top", "right"]].set_visible(False)
+        figure.savefig(args.out / f"tca_{draw.__name__[5:]}.png", dpi=120)
+
+
+if __name__ == "__main__":
+    main()
