@@ -44,6 +44,13 @@ class PickAndPlaceGains:
             further without getting too hot [s].
         carry_height: Height of the object while it is carried [m].
         drop_height: Height of the object when it is let go [m].
+        hover: Height above the object at which the gripper is aligned and opened [m].
+        climb_rate: Velocity of the base over the missing height, without an object [1/s].
+        carry_rate: The same with an object [1/s].
+        calm: Time without a change of the opening after which the fingers hold [s].
+        cool: Temperature of the gripper at which they do in any case [°C].
+        slipped: Depth of the object below the finger tips at which it counts as lost [m].
+        phase_limit: Time after which any phase is given up for the next one [s].
     """
 
     hottest: float = 160.0
@@ -62,6 +69,13 @@ class PickAndPlaceGains:
     patience: float = 12.0
     carry_height: float = 45e-3
     drop_height: float = 27e-3
+    hover: float = 20e-3
+    climb_rate: float = 1.4
+    carry_rate: float = 0.8
+    calm: float = 0.8
+    cool: float = 50.0
+    slipped: float = 8e-3
+    phase_limit: float = 40.0
 
 
 @dataclass(slots=True)
@@ -119,7 +133,7 @@ class PickAndPlace:
 
     def _next(self, seen: "_Seen") -> str:
         """The phase after this one if its goal is reached, else the same."""
-        gains, late = self.gains, self.since > 40.0
+        gains, late = self.gains, self.since > self.gains.phase_limit
         offset = float(np.linalg.norm(seen.object[:2] - seen.gripper[:2]))
         aligned = offset < gains.aligned and abs(seen.misaligned) < gains.aligned_yaw
         match self.phase:
@@ -129,9 +143,9 @@ class PickAndPlace:
                 return "lower"
             case "lower" if abs(seen.tips - self._height) < 4e-4 or late:
                 return "pinch"
-            case "pinch" if self._calm > 0.8 or seen.temperature[_GRIPPER] < 50.0:
+            case "pinch" if self._calm > gains.calm or seen.temperature[_GRIPPER] < gains.cool:
                 return "lift"
-            case "lift" if self.since > 1.0 and seen.object[2] < seen.gripper[2] - 8e-3:
+            case "lift" if self.since > 1.0 and seen.object[2] < seen.gripper[2] - gains.slipped:
                 return "open" if self.tries < 3 else "done"
             case "lift" if seen.object[2] > gains.carry_height - 2e-3 or late:
                 return "turn back"
@@ -154,14 +168,14 @@ class PickAndPlace:
         if phase in ("align", "open", "lower"):
             target[_BENDING] = self._steer(seen, seen.object[:2] - seen.gripper[:2])
             target[_WRIST] = seen.temperature[_WRIST] + 0.5 * gains.wrist_slope * seen.misaligned
-        elif phase in ("bend", "release", "done"):
-            held = phase != "bend"
-            error = np.zeros(2) if held else seen.cup[:2] - seen.object[:2]
-            target[_BENDING] = self._steer(seen, error)
+        elif phase == "bend":
+            target[_BENDING] = self._steer(seen, seen.cup[:2] - seen.object[:2])
+        elif phase in ("release", "done"):
+            target[_BENDING] = self._steer(seen, np.zeros(2))
         elif phase == "pinch":
             target[_BENDING] = self._steer(seen, np.zeros(2))
             target[_WRIST] = seen.temperature[_WRIST]
-        else:
+        else:  # lift and turn back: straight again
             self._bend *= 0.9
             target[_BENDING] = self._steer(seen, np.zeros(2))
         if phase in ("open", "lower", "release"):
@@ -197,24 +211,22 @@ class PickAndPlace:
 
     def _climb(self, seen: "_Seen") -> float:
         """Velocity of the base [m/s]."""
+        gains = self.gains
         match self.phase:
+            case "align" | "open":
+                return gains.climb_rate * (seen.object[2] + gains.hover - seen.gripper[2])
             case "lower":
-                return 1.5 * (self._height - seen.tips)
-            case "pinch":
-                return 0.0
+                return gains.climb_rate * (self._height - seen.tips)
             case "lift" | "turn back":
-                return 1.0 * (self.gains.carry_height - seen.object[2])
-            case "bend" | "release":
-                aside = float(np.linalg.norm(seen.object[:2] - seen.cup[:2]))
-                near = aside < 10e-3 or self.phase == "release"
-                height = self.gains.drop_height if near else self.gains.carry_height
-                if self.phase == "release":
-                    return 0.0
-                return 0.7 * (height - seen.object[2])
+                return gains.carry_rate * (gains.carry_height - seen.object[2])
+            case "bend":
+                near = np.linalg.norm(seen.object[:2] - seen.cup[:2]) < 1.5 * gains.over_cup
+                height = gains.drop_height if near else gains.carry_height
+                return gains.carry_rate * (height - seen.object[2])
             case "done":
-                return 0.02
+                return 0.5 * self.arm_spec.speed  # up and out of the way
             case _:
-                return 1.2 * (seen.object[2] + 20e-3 - seen.gripper[2])
+                return 0.0  # pinch and release
 
 
 # Unit vectors in the world towards which the three TCAs bend the hanging arm: the module's x

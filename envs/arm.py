@@ -46,6 +46,8 @@ ACTION = Table([Entry("TCA power", 5, -1.0, 1.0, "-"), Entry("base velocity", 1,
 _STAND = 25e-3  # height of the objects' centres on their stands [m]
 _LIFTED = 8e-3  # height above the stand at which an object counts as carried [m]
 _PARKED = (0.06, 0.05)  # where the object that is not used stands [m]
+# Turns the gripper's y and z axes, so that a gripper that hangs straight has no rotation.
+_HANGING = np.array([1.0, -1.0, -1.0] * 3)
 _CUP_RADIUS, _CUP_RIM = 12.5e-3, 16e-3  # of assets/mjcf/cup.xml [m]
 
 
@@ -62,7 +64,8 @@ class ArmPickPlace(gym.Env[Observation, Action]):
 
     Observation, shape (43,): see ``OBSERVATION``, whose rows have units and bounds. Positions and
     orientations are those of the world; the gripper's are of the point where its tips meet when
-    closed, with the fingers in its x-z plane and z from mount to tips.
+    closed, with the fingers in its x-z plane and z from tips to mount, so that it is not turned
+    while it hangs straight. The first number of a quaternion is not negative.
 
     Reward, the sum of the terms in ``info["reward_terms"]``:
         reach: Up to 0.1, the closer the gripper is to the object.
@@ -292,7 +295,7 @@ class ArmPickPlace(gym.Env[Observation, Action]):
         data, sim = self.data, self.sim
         tips = data.site_xpos[self._tips]
         turn = np.empty(4)
-        mujoco.mju_mat2Quat(turn, data.site_xmat[self._grasp])
+        mujoco.mju_mat2Quat(turn, data.site_xmat[self._grasp] * _HANGING)
         dofs = self._free_v[self.object]
         object_turn = data.xquat[self._body[self.object]]
         return OBSERVATION.pack(

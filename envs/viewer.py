@@ -55,9 +55,6 @@ class ViewerEnvironment(dm_env.Environment):
             seed: Seed of the first episode; later ones go on from there.
             options: Options of every reset.
         """
-        from dm_control import mujoco as dm_mujoco
-        from dm_control.mujoco import wrapper
-
         self.env = env
         self._seed = seed
         self._options = options
@@ -66,7 +63,7 @@ class ViewerEnvironment(dm_env.Environment):
         env.reset(seed=seed, options=options)
         # The sites that lead the TCAs would hide them.
         self._sim.model.site_group[:] = _HIDDEN
-        self.physics = dm_mujoco.Physics(wrapper.MjData(self._sim.data))
+        self.physics = self._sim.physics()
 
     def reset(self) -> dm_env.TimeStep:
         """Begins an episode."""

@@ -11,6 +11,7 @@ get the matching springs c F, so that the tension does the work that the length 
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -165,6 +166,15 @@ class Simulation:
     def energy(self) -> NDArray[np.float64]:
         """Electrical energy put into each TCA so far, shape (n,) [J]."""
         return self.tca.energy_in
+
+    def physics(self) -> Any:
+        """dm_control's named view of this model and data, which it shares.
+
+        For example ``physics().named.data.site_xpos["bending.tip"]``.
+        """
+        from dm_control.mujoco import Physics, wrapper  # loads OpenGL bindings: only if asked for
+
+        return Physics(wrapper.MjData(self.data))
 
     def step(self, power: ArrayLike, duration: float) -> None:
         """Advances by ``duration`` [s] at constant electrical ``power``, shape (n,) [W].

@@ -282,3 +282,10 @@ def test_a_bad_step_is_refused_and_changes_nothing(power, duration, message):
 def test_a_bad_simulation_is_refused(options, message):
     with pytest.raises(ValueError, match=message):
         simulation(**options)
+
+
+def test_dm_controls_names_see_the_same_state():
+    sim = simulation()
+    physics = sim.physics()
+    sim.step([1.0, 0.0, 0.0], 0.1)
+    assert physics.named.data.site_xpos["tip"] == pytest.approx(sim.data.site("tip").xpos, abs=0.0)

@@ -1,0 +1,95 @@
+"""Error of the modules by number of nodes, at rest and hot, as Markdown.
+
+    python scripts/node_table.py                      all modules, some minutes
+    python scripts/node_table.py finger --nodes 4 6 8
+
+Each module hangs at rest with its TCAs held at temperatures at which they work. Its tip's place
+and rotation are compared with those of the same module with many nodes; the TCAs' own law and the
+module's weight are part of it.
+"""
+
+import argparse
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tca_mj.model.part import Part
+from tca_mj.modules.bending import BendingSpec, bending_module
+from tca_mj.modules.finger import FingerPairSpec, finger_pair
+from tca_mj.modules.twisting import TwistingSpec, twisting_module
+from tca_mj.sim import Simulation
+from tca_mj.tca import TcaState
+
+Build = Callable[[int], Part]
+MODULES: dict[str, tuple[Build, str, float, list[list[float]]]] = {
+    "bending": (
+        lambda n: bending_module(BendingSpec(nodes=n)), "tip", BendingSpec().length,
+        [[100, 25, 25], [120, 25, 25], [120, 100, 25], [140, 60, 60]],
+    ),
+    "twisting": (
+        lambda n: twisting_module(TwistingSpec(nodes=n)), "tip", TwistingSpec().length,
+        [[80], [100], [120]],
+    ),
+    "finger": (
+        lambda n: finger_pair(FingerPairSpec(nodes=n)), "tip0", FingerPairSpec().length / 2,
+        [[25], [100], [120], [140]],
+    ),
+}  # fmt: skip
+
+
+def at_rest(part: Part, temperature: Sequence[float], timestep: float) -> Simulation:
+    """The hanging part with its TCAs at the given temperatures, once it moves no more."""
+    part.spec.option.gravity = [0.0, 0.0, 9.81]
+    sim = Simulation(part, timestep=timestep)
+    target = np.asarray(temperature, dtype=np.float64)
+    for share in np.minimum(np.arange(1, 90) / 10, 1.0):  # warmed up in a second
+        now = 25.0 + share * (target - 25.0)
+        sim.tca = TcaState(now, sim.tca.energy_in, sim.tca.energy_lost)
+        sim.step(sim.bank.heat.loss * (now - 25.0), 0.1)
+        if share == 1.0 and np.abs(sim.data.qvel).max() < 1e-6:
+            break
+    return sim
+
+
+def tip(sim: Simulation, site: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Place and rotation matrix of a site."""
+    return sim.data.site(site).xpos.copy(), sim.data.site(site).xmat.reshape(3, 3).copy()
+
+
+def angle(one: NDArray[np.float64], other: NDArray[np.float64]) -> float:
+    """Angle between two rotations [°]."""
+    return float(np.degrees(np.arccos(np.clip((np.trace(one.T @ other) - 1) / 2, -1, 1))))
+
+
+def main(argv: list[str] | None = None) -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("module", nargs="*", help=f"some of {', '.join(MODULES)}; default: all")
+    parser.add_argument("--nodes", type=int, nargs="+", default=[4, 6, 8, 10, 12, 16, 24])
+    parser.add_argument("--reference", type=int, default=64)
+    args = parser.parse_args(argv)
+    unknown = sorted(set(args.module) - set(MODULES))
+    if unknown:
+        parser.error(f"unknown modules {unknown}, known are {sorted(MODULES)}")
+    print("| module | TCAs [°C] | " + " | ".join(f"{n} nodes" for n in args.nodes) + " |")
+    print("|---|---|" + "---|" * len(args.nodes))
+    for name in args.module or MODULES:
+        build, site, length, cases = MODULES[name]
+        for case in cases:
+            exact = at_rest(build(args.reference), case, 1e-2)
+            place, turn = tip(exact, site)
+            cells = []
+            for nodes in args.nodes:
+                try:
+                    sim = at_rest(build(nodes), case, 4e-3)
+                except ValueError:  # too few nodes for the route
+                    cells.append("-")
+                    continue
+                at, turned = tip(sim, site)
+                error = 100.0 * float(np.linalg.norm(at - place)) / length
+                cells.append(f"{error:.2f} %, {angle(turn, turned):.1f}°")
+            print(f"| {name} | {', '.join(map(str, case))} | {' | '.join(cells)} |", flush=True)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,77 @@
+"""The pages: links lead somewhere, ids exist, examples run, tables are what the code says."""
+
+import re
+import runpy
+from pathlib import Path
+
+import gymnasium as gym
+import pytest
+
+import tca_mj  # noqa: F401  (registers the ids)
+
+ROOT = Path(__file__).resolve().parent.parent
+PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+ID = re.compile(r"\bTCA/[A-Za-z0-9]+-v\d+")
+FENCE = re.compile(r"^```([^\n]*)\n(.*?)^```", re.MULTILINE | re.DOTALL)
+LINK = re.compile(r"\]\(\s*<?([^)\s>]+)")
+
+
+def names(paths):
+    return [path.relative_to(ROOT).as_posix() for path in paths]
+
+
+def anchors(page):
+    """Names that headings of a page get on GitHub."""
+    text = FENCE.sub("", page.read_text(encoding="utf-8"))
+    headings = re.findall(r"^#+ +(.+?) *$", text, re.MULTILINE)
+    return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
+
+
+def examples():
+    for page in PAGES:
+        text = page.read_text(encoding="utf-8")
+        for match in FENCE.finditer(text):
+            if match[1].strip() == "python":
+                line = text.count("\n", 0, match.start()) + 1
+                # Empty lines in front: errors name the line of the page.
+                source = "\n" * line + match[2]
+                yield pytest.param(page, source, id=f"{page.name}:{line}")
+
+
+@pytest.mark.parametrize("page", PAGES, ids=names(PAGES))
+def test_links_and_pictures_exist(page):
+    text = FENCE.sub("", page.read_text(encoding="utf-8"))
+    missing = []
+    for link in LINK.findall(text):
+        if re.match(r"[a-z]+:", link):
+            continue
+        path, _, anchor = link.partition("#")
+        target = page.parent / path if path else page
+        if not target.exists() or (anchor and anchor not in anchors(target)):
+            missing.append(link)
+    assert missing == []
+
+
+def test_ids_in_the_pages_are_registered():
+    found = {name for page in PAGES for name in ID.findall(page.read_text(encoding="utf-8"))}
+    assert found
+    assert sorted(found - set(gym.registry)) == []
+
+
+@pytest.mark.parametrize(("page", "source"), list(examples()))
+def test_examples_run(page, source, tmp_path, monkeypatch):
+    """Marked ``python``; ``python no-run`` is skipped. Episodes are cut to five steps."""
+    monkeypatch.chdir(tmp_path)
+    for name, spec in gym.registry.items():
+        if name.startswith("TCA/"):
+            monkeypatch.setattr(spec, "max_episode_steps", 5)
+    exec(compile(source, str(page), "exec"), {"__name__": "__main__"})
+
+
+def test_tables_of_the_actuators_are_what_the_script_prints():
+    """After a change: python scripts/tca_figures.py --tables, and copy into docs/tca.md."""
+    pytest.importorskip("matplotlib")
+    script = runpy.run_path(str(ROOT / "scripts" / "tca_figures.py"))
+    page = (ROOT / "docs" / "tca.md").read_text(encoding="utf-8")
+    for table in script["tables"]():
+        assert table in page
