@@ -1,5 +1,6 @@
 """``TCA/ArmPickPlace-v0``: a soft arm lays an object into a cup (Sun, Section 4.1.4)."""
 
+import math
 from collections.abc import Mapping
 from typing import Any, ClassVar
 
@@ -101,7 +102,7 @@ class ArmPickPlace(gym.Env[Observation, Action]):
         *,
         render_mode: str | None = None,
         arm_spec: ArmSpec | None = None,
-        timestep: float = 4e-3,
+        timestep: float = 5e-3,
         camera: str = "front",
         size: tuple[int, int] = (960, 720),
     ) -> None:
@@ -110,7 +111,7 @@ class ArmPickPlace(gym.Env[Observation, Action]):
         Args:
             render_mode: None or ``"rgb_array"``.
             arm_spec: The arm, by default the published one.
-            timestep: Physics time step [s].
+            timestep: Physics time step; five of them must divide ``control_period`` [s].
             camera: Camera of the pictures: ``front``, ``side`` or ``close``.
             size: Width and height of the pictures [pixels].
 
@@ -122,13 +123,18 @@ class ArmPickPlace(gym.Env[Observation, Action]):
                 f"render_mode must be None or one of {self.metadata['render_modes']},"
                 f" got {render_mode!r}"
             )
+        updates = self.control_period / (5.0 * timestep) if timestep > 0.0 else 0.0
+        if not (np.isfinite(updates) and updates > 0.5 and abs(updates - round(updates)) < 1e-9):
+            raise ValueError(
+                f"timestep must be {self.control_period} s over a multiple of 5, got {timestep}"
+            )
         self.render_mode: str | None = render_mode
         self.arm_spec = arm_spec or ArmSpec()
         files = ["cup", *(name for kind in OBJECTS for name in (kind, f"{kind}_stand"))]
         part = scene(
             mjcf("arena.xml"), arm(self.arm_spec), {f: mjcf(f"{f}.xml") for f in files}, name="arm"
         )
-        self.sim = Simulation(part, timestep=timestep)
+        self.sim = Simulation(part, timestep=timestep, tca_period=5.0 * timestep)
         self.observation_space = OBSERVATION.space
         self.action_space = ACTION.space
         self._camera, self._size = camera, size
@@ -268,9 +274,10 @@ class ArmPickPlace(gym.Env[Observation, Action]):
         if outside:
             reason = reason or f"diverged: {', '.join(outside)} out of bounds"
             observation = self._bounded(observation)
+        terms, rests = self._reward(float(np.sum(power)) * self.control_period)
+        if reason is not None:  # nothing is known of a diverged state
+            terms["reach"] = terms["carry"] = 0.0
         reason = reason or self._damage()
-
-        terms, rests = self._reward(observation, float(np.sum(power)) * self.control_period)
         self._in_cup = self._in_cup + 1 if rests else 0
         success = self._in_cup >= 3 and reason is None
         terms["place"] = 20.0 if success else 0.0
@@ -327,22 +334,26 @@ class ArmPickPlace(gym.Env[Observation, Action]):
     def _damage(self) -> str | None:
         """Why a TCA does not survive, or None."""
         sim = self.sim
-        for i, name in enumerate(sim.tca_names):
-            if sim.temperature[i] > self.max_temperature:
-                return f"overheated: {name} above {self.max_temperature} °C"
-            if sim.tension[i] > sim.bank.breaking_force[i]:
-                return f"torn: {name} above {sim.bank.breaking_force[i]} N"
+        hot = sim.temperature > self.max_temperature
+        if hot.any():
+            name = sim.tca_names[int(np.argmax(hot))]
+            return f"overheated: {name} above {self.max_temperature} °C"
+        torn = sim.tension > sim.bank.breaking_force
+        if torn.any():
+            i = int(np.argmax(torn))
+            return f"torn: {sim.tca_names[i]} above {sim.bank.breaking_force[i]} N"
         return None
 
-    def _reward(self, observation: Observation, energy: float) -> tuple[dict[str, float], bool]:
+    def _reward(self, energy: float) -> tuple[dict[str, float], bool]:
         """The terms of the reward, and whether the object lies still in the cup."""
-        seen = OBSERVATION.read(observation.astype(np.float64))
-        position, cup = seen["object position"], seen["cup position"]
-        aside = float(np.hypot(*(position - cup)[:2]))
+        data = self.data
+        position, cup = self._position(), data.mocap_pos[self._cup]
+        dofs = self._free_v[self.object]
+        aside = math.hypot(position[0] - cup[0], position[1] - cup[1])
         inside = aside < _CUP_RADIUS and position[2] < _CUP_RIM
-        still = bool(np.linalg.norm(seen["object velocity"]) < 0.02)
-        rests = inside and still and self._carried and not self._touched()
-        gap = float(np.linalg.norm(position - seen["gripper position"]))
+        still = inside and float(np.linalg.norm(data.qvel[dofs : dofs + 3])) < 0.02
+        rests = still and self._carried and not self._touched()
+        gap = math.dist(position, data.site_xpos[self._grasp])
         near = float(rewards.tolerance(gap, bounds=(0.0, 4e-3), margin=0.05))
         over = float(rewards.tolerance(aside, bounds=(0.0, 8e-3), margin=0.03))
         return {

@@ -45,13 +45,14 @@ class Table:
             self.slices[entry.name] = slice(start, start + entry.size)
             start += entry.size
         self.size = start
-        self._low = np.repeat([e.low for e in self.entries], [e.size for e in self.entries])
-        self._high = np.repeat([e.high for e in self.entries], [e.size for e in self.entries])
+        sizes = [entry.size for entry in self.entries]
+        self._low = np.repeat([e.low for e in self.entries], sizes).astype(np.float32)
+        self._high = np.repeat([e.high for e in self.entries], sizes).astype(np.float32)
 
     @property
     def space(self) -> Any:
         """The table as a Gymnasium ``Box`` of float32."""
-        return Box(self._low.astype(np.float32), self._high.astype(np.float32), dtype=np.float32)
+        return Box(self._low, self._high, dtype=np.float32)
 
     def pack(self, values: dict[str, ArrayLike]) -> NDArray[np.float32]:
         """Lays the rows' values end to end.
@@ -61,13 +62,11 @@ class Table:
         """
         if values.keys() != self.slices.keys():
             raise ValueError(f"values must be {sorted(self.slices)}, got {sorted(values)}")
-        out = np.empty(self.size, dtype=np.float32)
-        for entry in self.entries:
-            row = np.asarray(values[entry.name], dtype=np.float32)
+        rows = [np.ravel(values[entry.name]) for entry in self.entries]
+        for entry, row in zip(self.entries, rows, strict=True):
             if row.size != entry.size:
                 raise ValueError(f"{entry.name} must have {entry.size} numbers, got {row.size}")
-            out[self.slices[entry.name]] = row.reshape(-1)
-        return out
+        return np.concatenate(rows, dtype=np.float32, casting="same_kind")
 
     def read(self, array: NDArray[Any]) -> dict[str, NDArray[Any]]:
         """The rows of an array of shape (..., size), by name."""
@@ -75,8 +74,10 @@ class Table:
 
     def outside(self, array: NDArray[Any]) -> list[str]:
         """Names of the rows that are not finite or out of their bounds."""
-        low, high = self._low.astype(np.float32), self._high.astype(np.float32)
-        bad = ~(np.isfinite(array) & (array >= low) & (array <= high))
+        good = (array >= self._low) & (array <= self._high)  # false for what is not a number
+        if good.all():
+            return []
+        bad = ~good
         return [name for name, where in self.slices.items() if bad[where].any()]
 
     def markdown(self) -> str:

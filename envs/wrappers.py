@@ -9,7 +9,7 @@ import gymnasium as gym
 from gymnasium.core import ActType, ObsType
 from gymnasium.utils import RecordConstructorArgs
 
-from tca_mj.record import Recorder
+from tca_mj.record import Recorder, check_options
 
 
 class RecordRerun(gym.Wrapper[ObsType, ActType, ObsType, ActType], RecordConstructorArgs):
@@ -53,14 +53,11 @@ class RecordRerun(gym.Wrapper[ObsType, ActType, ObsType, ActType], RecordConstru
             footer: Ends the file with a table of contents.
 
         Raises:
-            ValueError: If ``env`` has no simulation or a number is not positive.
+            ValueError: If ``env`` has no simulation, or as ``check_options`` of ``tca_mj.record``.
         """
         if not hasattr(env.unwrapped, "sim"):
             raise ValueError(f"env must have a simulation as env.unwrapped.sim, got {env}")
-        if every < 1 or chunk < 1:
-            raise ValueError(f"every and chunk must be at least 1, got {every} and {chunk}")
-        if tca_radius is not None and not tca_radius > 0.0:
-            raise ValueError(f"tca_radius must be above 0 m, got {tca_radius}")
+        check_options(every=every, chunk=chunk, tca_radius=tca_radius)
         options: dict[str, Any] = {
             "application_id": application_id,
             "every": every,

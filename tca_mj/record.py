@@ -28,6 +28,7 @@ import rerun.blueprint as layout
 from numpy.typing import NDArray
 
 from tca_mj.plots import series_colours, temperature_colour
+from tca_mj.rod.beam import require_count, require_positive
 from tca_mj.shapes import body_paths, extent, ground_height, moving_bodies, rgba_bytes, shapes
 
 QUANTITIES = {
@@ -117,12 +118,9 @@ class Recorder:
                 ``rerun rrd verify`` objects to the file.
 
         Raises:
-            ValueError: If a number is not positive.
+            ValueError: As ``check_options``.
         """
-        if every < 1 or chunk < 1:
-            raise ValueError(f"every and chunk must be at least 1, got {every} and {chunk}")
-        if tca_radius is not None and not tca_radius > 0.0:
-            raise ValueError(f"tca_radius must be above 0 m, got {tca_radius}")
+        check_options(every=every, chunk=chunk, tca_radius=tca_radius)
         self.simulation = simulation
         self.path = Path(path)
         self._every = every
@@ -316,6 +314,18 @@ class Recorder:
             for quantity in QUANTITIES:
                 style = rerun.SeriesLines(colors=rgba_bytes(colour), names=name, widths=1.5)
                 yield _curve(name, quantity), style
+
+
+def check_options(*, every: int, chunk: int, tca_radius: float | None) -> None:
+    """Checks numbers that a ``Recorder`` is made with, before it touches a file.
+
+    Raises:
+        ValueError: If ``every`` or ``chunk`` is no whole number above 0, or the radius not finite
+            and positive.
+    """
+    require_count(every=every, chunk=chunk)
+    if tca_radius is not None:
+        require_positive(tca_radius=tca_radius)
 
 
 def _packed(colour: NDArray[np.float64]) -> NDArray[np.uint32]:

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tca_mj.model.part import Part
-from tca_mj.tca import Pull, TcaBank, TcaState
+from tca_mj.tca import CoilSolveError, Pull, TcaBank, TcaState
 
 _DIVERGENCE = (
     mujoco.mjtWarning.mjWARN_BADQPOS,
@@ -182,8 +182,8 @@ class Simulation:
         Raises:
             ValueError: If the power has the wrong shape, is negative or not finite, or the
                 duration is no multiple of ``tca_period``.
-            SimulationDiverged: If the state is no longer finite, or a TCA is shorter or longer
-                than its law holds for.
+            SimulationDiverged: If the state is no longer finite, or a TCA is shorter, longer or
+                hotter than its law holds for.
         """
         power = np.array(power, dtype=np.float64)
         if power.shape != (self.n,):
@@ -200,7 +200,12 @@ class Simulation:
         for _ in range(updates):
             length = self.length
             self._check_length(length)
-            self.tca, pull = self.bank.advance(self.tca, power, length, self.tca_period)
+            try:
+                self.tca, pull = self.bank.advance(self.tca, power, length, self.tca_period)
+            except (CoilSolveError, ValueError) as error:  # far too hot for the law
+                raise SimulationDiverged(
+                    f"the TCAs have no state at {self.time:.3f} s: {error}"
+                ) from error
             self._hand_over(pull)
             mujoco.mj_step(model, data, self._substeps)
         self._check()

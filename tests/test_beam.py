@@ -112,8 +112,8 @@ def test_a_bad_outer_diameter_is_refused():
 @pytest.mark.parametrize(
     ("half_width", "half_height", "message"),
     [
-        (0.0, 1e-3, "half_width and half_height must be above 0 m"),
-        (1e-3, math.nan, "half_width and half_height must be above 0 m"),
+        (0.0, 1e-3, r"half_width must be finite and above 0, got 0\.0"),
+        (1e-3, math.nan, "half_height must be finite and above 0, got nan"),
         (1e-3, 2e-3, "a round outline has half_width equal to half_height"),
     ],
 )

@@ -79,6 +79,8 @@ def test_ctrl_c_returns_130(
     ("arguments", "named"),
     [
         (["demo", "pick-and-place", "--seed", "-1"], "at least 0"),
+        (["demo", "pick-and-place", "--seed", "1.5"], "must be a whole number, got '1.5'"),
+        (["demo", "pick-and-place", "--out", f"{__file__}/new/folder"], "must be a folder"),
         (["demo", "pick-and-place", "--object", "hammer"], "hammer"),
         (["demo", "pick-and-place", "--out", __file__], "must be a folder"),
         (["demo", "juggle"], "juggle"),

@@ -231,6 +231,14 @@ def test_divergence_is_reported(value, tmp_path, monkeypatch):
         sim.step(np.zeros(3), 0.1)
 
 
+@pytest.mark.parametrize("power", [200.0, 1e5])
+def test_a_tca_that_is_far_too_hot_is_a_divergence(power):
+    """200 W: 2000 °C in half a second, no shape of the coil; 100 kW: no modulus at once."""
+    sim = simulation()
+    with pytest.raises(SimulationDiverged, match="the TCAs have no state at .* s: "):
+        sim.step([power, 0.0, 0.0], 1.0)
+
+
 @pytest.mark.parametrize("stretch", [-0.8, 5.0])
 def test_a_tca_outside_of_its_law_is_a_divergence(stretch):
     """Squeezed or torn out by somebody who moved the joints."""

@@ -18,7 +18,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from tca_mj.rod.beam import BeamSpec
+from tca_mj.rod.beam import BeamSpec, require_count
 
 Motion = Literal["stretch", "bend_x", "bend_y", "twist"]
 MOTIONS: tuple[Motion, ...] = ("stretch", "bend_x", "bend_y", "twist")
@@ -100,10 +100,10 @@ def beam(
         The chain.
 
     Raises:
-        ValueError: If there are no nodes, no motions, or an unknown motion.
+        ValueError: If there are no nodes or too few for the curvature, no motions, or an unknown
+            motion.
     """
-    if nodes < 1:
-        raise ValueError(f"nodes must be at least 1, got {nodes}")
+    require_count(nodes=nodes)
     unknown = [motion for motion in motions if motion not in MOTIONS]
     if unknown or not motions:
         raise ValueError(f"motions must be some of {MOTIONS}, got {tuple(motions)}")

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from tca_mj.model.chain import beam
 from tca_mj.model.part import Part, new_spec
 from tca_mj.model.tendon import route_passes, route_tca
-from tca_mj.rod.beam import BeamSpec
+from tca_mj.rod.beam import BeamSpec, require_count, require_positive
 from tca_mj.routes import leg_length, parallel
 from tca_mj.tca import CATALOGUE, TcaSpec
 
@@ -32,6 +32,9 @@ class BendingSpec:
         nodes: Nodes of the chain. With 8 the tip lies within 1 % of the length of the limit of
             many nodes up to 90°, within 2 % up to 160°.
         tca: The kind of TCA, cut to the module's length.
+
+    Raises:
+        ValueError: If a dimension is not finite and positive, or a number of pieces not whole.
     """
 
     length: float = 45e-3
@@ -41,6 +44,11 @@ class BendingSpec:
     count: int = 3
     nodes: int = 8
     tca: TcaSpec = field(default_factory=lambda: CATALOGUE["free-stroke"])
+
+    def __post_init__(self) -> None:
+        require_positive(length=self.length, diameter=self.diameter,
+                         outer_diameter=self.outer_diameter, offset=self.offset)  # fmt: skip
+        require_count(count=self.count, nodes=self.nodes)
 
     @property
     def body(self) -> BeamSpec:

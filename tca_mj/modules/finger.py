@@ -12,7 +12,7 @@ from tca_mj.model.chain import Chain, beam
 from tca_mj.model.part import Part, new_spec
 from tca_mj.model.tendon import Pass, route_tca
 from tca_mj.modules.bending import SILICONE_DENSITY, SILICONE_YOUNG
-from tca_mj.rod.beam import BeamSpec
+from tca_mj.rod.beam import BeamSpec, require_count, require_positive
 from tca_mj.routes import UTurn, leg_length
 from tca_mj.tca import CATALOGUE, TcaSpec
 
@@ -45,6 +45,10 @@ class FingerPairSpec:
         friction: Sliding friction of the silicone. Estimate.
         tca: The kind of TCA, cut to the route's length in the closed gripper.
         sheath_capacity: Heat capacity of the silicone heated with the TCA [J/K]. Estimate.
+
+    Raises:
+        ValueError: If a dimension is not finite and positive, a number of nodes not whole, or the
+            friction negative.
     """
 
     length: float = 35e-3
@@ -59,6 +63,15 @@ class FingerPairSpec:
     friction: float = 1.0
     tca: TcaSpec = field(default_factory=lambda: CATALOGUE["free-stroke"])
     sheath_capacity: float = 0.06
+
+    def __post_init__(self) -> None:
+        require_positive(
+            length=self.length, width=self.width, core=self.core, layer=self.layer,
+            layer_young=self.layer_young, closure=self.closure,
+        )  # fmt: skip
+        require_count(nodes=self.nodes)
+        if not 0.0 <= self.friction < math.inf:
+            raise ValueError(f"friction must be finite and at least 0, got {self.friction}")
 
     @property
     def thickness(self) -> float:

@@ -6,7 +6,7 @@ from tca_mj.model.chain import beam
 from tca_mj.model.part import Part, new_spec
 from tca_mj.model.tendon import route_passes, route_tca
 from tca_mj.modules.bending import SILICONE_DENSITY, SILICONE_SHEAR, SILICONE_YOUNG
-from tca_mj.rod.beam import BeamSpec
+from tca_mj.rod.beam import BeamSpec, require_count, require_positive
 from tca_mj.routes import Helix, Route, UTurn, leg_length
 from tca_mj.tca import CATALOGUE, TcaSpec
 
@@ -33,6 +33,9 @@ class TwistingSpec:
             half turn after 28 W for 2 s (Sun, Section 4.1.2).
         sheath_area: Surface of that tube, 3.2 mm thick, per length of TCA [m]. Estimate: the
             tube's whole surface.
+
+    Raises:
+        ValueError: If a dimension is not finite and positive, or a number of nodes not whole.
     """
 
     length: float = 16e-3
@@ -45,6 +48,13 @@ class TwistingSpec:
     tca: TcaSpec = field(default_factory=lambda: CATALOGUE["free-stroke"])
     sheath_capacity: float = 0.39
     sheath_area: float = 3.14159 * 3.2e-3
+
+    def __post_init__(self) -> None:
+        require_positive(
+            length=self.length, diameter=self.diameter, outer_diameter=self.outer_diameter,
+            radius=self.radius, sheath_area=self.sheath_area,
+        )  # fmt: skip
+        require_count(nodes=self.nodes)
 
     @property
     def body(self) -> BeamSpec:

@@ -3,14 +3,17 @@
 The arm hangs from a base that moves only up and down.
 """
 
+import math
 from dataclasses import dataclass, field
 
 import mujoco
+import numpy as np
 
 from tca_mj.model.part import Part, new_spec
 from tca_mj.modules.bending import BendingSpec, bending_module
 from tca_mj.modules.finger import FingerPairSpec, finger_pair
 from tca_mj.modules.twisting import TwistingSpec, twisting_module
+from tca_mj.rod.beam import require_positive
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -27,6 +30,9 @@ class ArmSpec:
         height: Height of the base above the ground at the start [m].
         travel: Lowest and highest height of the base [m].
         speed: Largest speed of the base [m/s]. Estimate.
+
+    Raises:
+        ValueError: If a number is not finite and positive, or the height is outside the travel.
     """
 
     bending: BendingSpec = field(default_factory=BendingSpec)
@@ -39,12 +45,12 @@ class ArmSpec:
     speed: float = 0.04
 
     def __post_init__(self) -> None:
-        for name in ("connector", "connector_mass", "speed"):
-            if not getattr(self, name) > 0.0:
-                raise ValueError(f"{name} must be above 0, got {getattr(self, name)}")
-        low, high = self.travel
-        if not 0.0 < low < high:
+        require_positive(
+            connector=self.connector, connector_mass=self.connector_mass, speed=self.speed
+        )
+        if np.shape(self.travel) != (2,) or not 0.0 < self.travel[0] < self.travel[1] < math.inf:
             raise ValueError(f"travel must be two heights, 0 < low < high, got {self.travel}")
+        low, high = self.travel
         if not low <= self.height <= high:
             raise ValueError(f"height must be within travel {self.travel}, got {self.height}")
 

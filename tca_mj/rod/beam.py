@@ -1,6 +1,8 @@
 """What a soft beam is made of: section, stiffness, mass and reference shape."""
 
+import math
 from dataclasses import dataclass
+from numbers import Integral, Real
 
 import numpy as np
 
@@ -13,6 +15,9 @@ class Outline:
         half_width: Half the extent along the section's x axis, or the radius of a disc [m].
         half_height: Half the extent along y [m].
         round: Whether the section is a disc (then both halves are equal).
+
+    Raises:
+        ValueError: If a half is not finite and positive, or those of a disc differ.
     """
 
     half_width: float
@@ -20,8 +25,7 @@ class Outline:
     round: bool = True
 
     def __post_init__(self) -> None:
-        if not (self.half_width > 0.0 and self.half_height > 0.0):
-            raise ValueError(f"half_width and half_height must be above 0 m, got {self}")
+        require_positive(half_width=self.half_width, half_height=self.half_height)
         if self.round and self.half_width != self.half_height:
             raise ValueError(f"a round outline has half_width equal to half_height, got {self}")
 
@@ -74,21 +78,22 @@ class BeamSpec:
     damping_time: float = 1e-2
 
     def __post_init__(self) -> None:
-        positive = {
-            "length": self.length,
-            "bending[0]": self.bending[0],
-            "bending[1]": self.bending[1],
-            "torsion": self.torsion,
-            "stretching": self.stretching,
-            "shearing": self.shearing,
-            "line_density": self.line_density,
-        }
-        for field, value in positive.items():
-            if not (np.isfinite(value) and value > 0.0):
-                raise ValueError(f"{field} must be finite and above 0, got {value}")
+        if np.shape(self.bending) != (2,):
+            raise ValueError(f"bending must be two numbers, got {self.bending}")
+        require_positive(
+            **{
+                "length": self.length,
+                "bending[0]": self.bending[0],
+                "bending[1]": self.bending[1],
+                "torsion": self.torsion,
+                "stretching": self.stretching,
+                "shearing": self.shearing,
+                "line_density": self.line_density,
+            }
+        )
         if not (np.isfinite(self.damping_time) and self.damping_time >= 0.0):
             raise ValueError(f"damping_time must be at least 0 s, got {self.damping_time}")
-        if len(self.curvature) != 3 or not np.all(np.isfinite(self.curvature)):
+        if np.shape(self.curvature) != (3,) or not np.all(np.isfinite(self.curvature)):
             raise ValueError(f"curvature must be three finite numbers, got {self.curvature}")
 
     @property
@@ -124,10 +129,10 @@ class BeamSpec:
         Raises:
             ValueError: If a dimension or a modulus is not positive.
         """
-        _require_positive(length=length, diameter=diameter, young=young, shear=shear,
-                          density=density)  # fmt: skip
+        require_positive(length=length, diameter=diameter, young=young, shear=shear,
+                         density=density)  # fmt: skip
         outer = diameter if outer_diameter is None else outer_diameter
-        _require_positive(outer_diameter=outer)
+        require_positive(outer_diameter=outer)
         area = np.pi * diameter**2 / 4.0
         inertia = np.pi * diameter**4 / 64.0
         outline = Outline(outer / 2.0, outer / 2.0)
@@ -164,8 +169,8 @@ class BeamSpec:
         Raises:
             ValueError: If a dimension or a modulus is not positive.
         """
-        _require_positive(length=length, width=width, height=height, young=young, shear=shear,
-                          density=density)  # fmt: skip
+        require_positive(length=length, width=width, height=height, young=young, shear=shear,
+                         density=density)  # fmt: skip
         area = width * height
         return cls(
             length=length,
@@ -192,7 +197,25 @@ def torsion_constant(width: float, height: float) -> float:
     return float(longer * shorter**3 * (1 / 3 - 64.0 / np.pi**5 * shorter / longer * series))
 
 
-def _require_positive(**values: float) -> None:
+def require_positive(**values: float) -> None:
+    """Checks fields of a spec by name.
+
+    Raises:
+        ValueError: If one of them is no number, not finite or not above 0.
+    """
     for field, value in values.items():
-        if not (np.isfinite(value) and value > 0.0):
-            raise ValueError(f"{field} must be finite and above 0, got {value}")
+        if not (isinstance(value, Real) and math.isfinite(value) and value > 0.0):
+            raise ValueError(f"{field} must be finite and above 0, got {value!r}")
+
+
+def require_count(**values: int) -> None:
+    """Checks fields of a spec that count something.
+
+    Raises:
+        ValueError: If one of them is no whole number or below 1.
+    """
+    for field, value in values.items():
+        if not isinstance(value, Integral):
+            raise ValueError(f"{field} must be a whole number, got {value!r}")
+        if value < 1:
+            raise ValueError(f"{field} must be at least 1, got {value!r}")

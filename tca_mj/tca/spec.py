@@ -8,6 +8,7 @@ they are two fibres here.
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from numbers import Real
 from types import MappingProxyType
 from typing import Literal
 
@@ -17,13 +18,13 @@ _ABSOLUTE_ZERO = -273.15  # [°C]
 
 
 def _require(name: str, value: float, *, above: float, below: float = math.inf) -> None:
-    if not above < value < below:
-        raise ValueError(f"{name} = {value} must lie strictly between {above} and {below}")
+    if not (isinstance(value, Real) and above < value < below):
+        raise ValueError(f"{name} = {value!r} must lie strictly between {above} and {below}")
 
 
 def _require_not_negative(name: str, value: float) -> None:
-    if not 0.0 <= value < math.inf:
-        raise ValueError(f"{name} = {value} must be finite and not below 0")
+    if not (isinstance(value, Real) and 0.0 <= value < math.inf):
+        raise ValueError(f"{name} = {value!r} must be finite and not below 0")
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
