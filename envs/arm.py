@@ -94,7 +94,7 @@ class ArmPickPlace(gym.Env[Observation, Action]):
     control_period = 0.1  # [s]
     object_range = 5e-3  # largest offset of the object in x and in y [m]
     yaw_range = (np.radians(120.0), np.radians(155.0))
-    cup_range = (22.5e-3, 26.5e-3)  # distance of the cup's axis from the arm's [m]
+    cup_range = (23e-3, 26.5e-3)  # distance of the cup's axis from the arm's [m]
     cup_angle = np.radians(20.0)  # of the cup's direction about -x
 
     def __init__(

@@ -9,7 +9,8 @@ import gymnasium as gym
 from gymnasium.core import ActType, ObsType
 from gymnasium.utils import RecordConstructorArgs
 
-from tca_mj.record import Recorder, check_options
+from tca_mj.record import Recorder
+from tca_mj.rod.beam import require_count, require_positive
 
 
 class RecordRerun(gym.Wrapper[ObsType, ActType, ObsType, ActType], RecordConstructorArgs):
@@ -53,11 +54,13 @@ class RecordRerun(gym.Wrapper[ObsType, ActType, ObsType, ActType], RecordConstru
             footer: Ends the file with a table of contents.
 
         Raises:
-            ValueError: If ``env`` has no simulation, or as ``check_options`` of ``tca_mj.record``.
+            ValueError: If ``env`` has no simulation or a number is not positive.
         """
         if not hasattr(env.unwrapped, "sim"):
             raise ValueError(f"env must have a simulation as env.unwrapped.sim, got {env}")
-        check_options(every=every, chunk=chunk, tca_radius=tca_radius)
+        require_count(every=every, chunk=chunk)
+        if tca_radius is not None:
+            require_positive(tca_radius=tca_radius)
         options: dict[str, Any] = {
             "application_id": application_id,
             "every": every,

@@ -118,9 +118,11 @@ class Recorder:
                 ``rerun rrd verify`` objects to the file.
 
         Raises:
-            ValueError: As ``check_options``.
+            ValueError: If a number is not positive, or not whole where it counts.
         """
-        check_options(every=every, chunk=chunk, tca_radius=tca_radius)
+        require_count(every=every, chunk=chunk)
+        if tca_radius is not None:
+            require_positive(tca_radius=tca_radius)
         self.simulation = simulation
         self.path = Path(path)
         self._every = every
@@ -314,18 +316,6 @@ class Recorder:
             for quantity in QUANTITIES:
                 style = rerun.SeriesLines(colors=rgba_bytes(colour), names=name, widths=1.5)
                 yield _curve(name, quantity), style
-
-
-def check_options(*, every: int, chunk: int, tca_radius: float | None) -> None:
-    """Checks numbers that a ``Recorder`` is made with, before it touches a file.
-
-    Raises:
-        ValueError: If ``every`` or ``chunk`` is no whole number above 0, or the radius not finite
-            and positive.
-    """
-    require_count(every=every, chunk=chunk)
-    if tca_radius is not None:
-        require_positive(tca_radius=tca_radius)
 
 
 def _packed(colour: NDArray[np.float64]) -> NDArray[np.uint32]:

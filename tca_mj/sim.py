@@ -9,7 +9,7 @@ polyline stands for, l + ½ Σ c θ², with the coefficients c of ``RoutedTca.st
 get the matching springs c F, so that the tension does the work that the length says.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -82,16 +82,15 @@ class Simulation:
         )
 
         # Joints whose stiffness depends on the tensions: k = k0 + coupling @ tension.
-        joints = sorted({model.joint(j).id for tca in part.tcas for j, _ in tca.stiffening})
-        row = {joint: i for i, joint in enumerate(joints)}
-        self._coupling = np.zeros((len(joints), len(part.tcas)))
-        for column, tca in enumerate(part.tcas):
-            for name, value in tca.stiffening:
-                self._coupling[row[model.joint(name).id], column] += value
-        self._joint = np.array(joints, dtype=np.int64)
+        self._joint, self._coupling = _matrix(model, [tca.stiffening for tca in part.tcas])
         self._joint_qpos = model.jnt_qposadr[self._joint]
         self._stiffness = model.jnt_stiffness[self._joint].copy()
         self._spring = model.qpos_spring[self._joint_qpos].copy()
+        # The stiffness from a tendon's change of direction is explicit in MuJoCo. Damping, which
+        # is implicit, of that stiffness times the time step keeps it stable at any tension.
+        hinge, self._geometric = _matrix(model, [tca.geometric for tca in part.tcas])
+        self._hinge_dof = model.jnt_dofadr[hinge]
+        self._damping = model.dof_damping[self._hinge_dof].copy()
 
         # The bodies' unloaded shape is that of their springs; TCAs are measured from there.
         scalar = model.jnt_type >= int(mujoco.mjtJoint.mjJNT_SLIDE)
@@ -219,8 +218,11 @@ class Simulation:
         bias = model.actuator_biasprm
         bias[self._actuator, 0] = -pull.tension + pull.stiffness * tendon_length
         bias[self._actuator, 1] = -pull.stiffness
-        stiffness = self._stiffness + self._coupling @ np.maximum(pull.tension, 0.0)
+        tension = np.maximum(pull.tension, 0.0)
+        stiffness = self._stiffness + self._coupling @ tension
         model.jnt_stiffness[self._joint] = stiffness
+        steady = model.opt.timestep * (self._geometric @ tension)
+        model.dof_damping[self._hinge_dof] = self._damping + steady
         # The added spring pulls towards the straight joint, the body's own to its reference.
         model.qpos_spring[self._joint_qpos] = self._stiffness * self._spring / stiffness
 
@@ -243,3 +245,16 @@ class Simulation:
                 f"the state diverged at {data.time:.3f} s ({names}); a smaller timestep or less"
                 " power may help"
             )
+
+
+def _matrix(
+    model: mujoco.MjModel, columns: Sequence[Sequence[tuple[str, float]]]
+) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Ids of the joints named in any column, and their values, shape (joints, columns)."""
+    joints = sorted({model.joint(name).id for column in columns for name, _ in column})
+    row = {joint: i for i, joint in enumerate(joints)}
+    matrix = np.zeros((len(joints), len(columns)))
+    for i, column in enumerate(columns):
+        for name, value in column:
+            matrix[row[model.joint(name).id], i] += value
+    return np.array(joints, dtype=np.int64), matrix

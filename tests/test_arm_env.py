@@ -271,7 +271,7 @@ def test_bad_actions_are_refused(shared, action, message):
     [
         ({"render_mode": "human"}, "render_mode must be None or one of .* got 'human'"),
         ({"timestep": 3e-3}, "timestep must be 0.1 s over a multiple of 5, got 0.003"),
-        ({"timestep": 0.0}, "timestep must be finite and above 0 s"),
+        ({"timestep": 0.0}, "timestep must be 0.1 s over a multiple of 5, got 0.0"),
     ],
 )
 def test_bad_arguments_are_refused(options, message):

@@ -364,7 +364,13 @@ def test_the_file_brings_its_layout(tmp_path: Path, simulation: Chain) -> None:
         assert name in text
 
 
-@pytest.mark.parametrize("wrong", [{"every": 0}, {"chunk": 0}, {"tca_radius": 0.0}])
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"every": 0}, {"every": 1.5}, {"chunk": 0}, {"chunk": 2.5}, {"tca_radius": 0.0},
+        {"tca_radius": float("inf")},
+    ],
+)
 def test_wrong_numbers_are_refused(tmp_path: Path, simulation: Chain, wrong: Any) -> None:
     with pytest.raises(ValueError, match=next(iter(wrong))):
         Recorder(simulation, tmp_path / "a.rrd", **wrong)

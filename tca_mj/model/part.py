@@ -48,6 +48,7 @@ class Part:
                 tca,
                 name=f"{prefix}.{tca.name}",
                 stiffening=tuple((f"{prefix}.{joint}", k) for joint, k in tca.stiffening),
+                geometric=tuple((f"{prefix}.{joint}", k) for joint, k in tca.geometric),
             )
             for tca in child.tcas
         )

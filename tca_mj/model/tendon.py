@@ -50,6 +50,8 @@ class RoutedTca:
         stretch: Pre-stretch in the unloaded body, negative for a TCA with slack [m].
         stiffening: Names of the bending joints that the polyline of sites softens, and the
             stiffness to give back to each per newton of tension [m/rad].
+        geometric: Names of the hinges that a tension stiffens because it changes direction, and
+            that stiffness per newton [m/rad]. MuJoCo's implicit step does not know of it.
     """
 
     name: str
@@ -57,6 +59,7 @@ class RoutedTca:
     path_length: float
     stretch: float
     stiffening: tuple[tuple[str, float], ...]
+    geometric: tuple[tuple[str, float], ...]
 
 
 def route_passes(chain: Chain, route: Route) -> tuple[Pass, ...]:
@@ -104,6 +107,7 @@ def route_tca(
     width = tca.coil_radius + tca.fibre.radius  # as thick as the coil
     tendon = spec.add_tendon(name=name, width=width, rgba=[0.1, 0.2, 0.6, 1.0])
     stiffening: dict[str, float] = {}
+    geometric: dict[str, float] = {}
     for index, item in enumerate(passes):
         _check_inside(item, name)
         _add_mass(item, tca.mass / len(passes))
@@ -119,8 +123,11 @@ def route_tca(
                 group=4,
             )
             tendon.wrap_site(site)
-        for joint, value in _stiffening(item, held, offsets):
-            stiffening[joint] = stiffening.get(joint, 0.0) + value
+        for joint, polyline, smooth in _second_derivatives(item, held, offsets):
+            if smooth is not None:
+                stiffening[joint] = stiffening.get(joint, 0.0) + smooth - polyline
+            if polyline > 0.0:
+                geometric[joint] = geometric.get(joint, 0.0) + polyline
     actuator = spec.add_actuator(name=name)
     actuator.trntype = mujoco.mjtTrn.mjTRN_TENDON
     actuator.target = name
@@ -136,6 +143,7 @@ def route_tca(
         path_length=length,
         stretch=stretch,
         stiffening=tuple(stiffening.items()),
+        geometric=tuple(geometric.items()),
     )
 
 
@@ -194,32 +202,33 @@ def _site_offsets(item: Pass, held: NDArray[np.int64]) -> NDArray[np.float64]:
     return offsets * (radius / item.leg.radius)
 
 
-_BEND: tuple[Motion, ...] = ("bend_x", "bend_y")
+_HINGES: tuple[Motion, ...] = ("bend_x", "bend_y", "twist")  # about x, y, z
 
 
-def _stiffening(
+def _second_derivatives(
     item: Pass, held: NDArray[np.int64], offsets: NDArray[np.float64]
-) -> list[tuple[str, float]]:
-    """The stiffness that a unit tension owes each bending joint of the chain.
+) -> list[tuple[str, float, float | None]]:
+    """How the leg's length bends with each hinge's angle, in the straight body [m/rad²].
 
-    That is the second derivative of the smooth leg's length by the joint's angle minus that of
-    the polyline's, both in the straight body.
+    Returns:
+        For each hinge its name, the polyline's second derivative and, for bending, that of the
+        smooth leg: per newton, the first is the stiffness that the tension gives the hinge and
+        the second the one that it ought to give.
     """
     chain, points = item.chain, item.chain.points
-    result = []
+    scale = chain.piece / chain.cell
+    result: list[tuple[str, float, float | None]] = []
     for k in range(len(held) - 1):
         inside = range(int(held[k]), int(held[k + 1]))  # nodes between two neighbouring sites
         for node in inside:
             height = (node + 0.5) * chain.cell
-            scale = chain.piece / chain.cell
             below = np.array([*offsets[k], scale * (points[held[k]] - height)])
             above = np.array([*offsets[k + 1], scale * (points[held[k + 1]] - height)])
-            for motion in _BEND:
+            for axis, motion in enumerate(_HINGES):
                 if motion in chain.joints[node]:
-                    axis = 0 if motion == "bend_x" else 1
                     polyline = _second_derivative(below, above, axis)
-                    smooth = _smooth_second_derivative(item, node, axis)
-                    result.append((chain.joints[node][motion], smooth - polyline))
+                    smooth = _smooth_second_derivative(item, node, axis) if axis < 2 else None
+                    result.append((chain.joints[node][motion], polyline, smooth))
     return result
 
 
