@@ -20,12 +20,16 @@ from numpy.typing import ArrayLike, NDArray
 from tca_mj.model.part import Part
 from tca_mj.tca import CoilSolveError, Pull, TcaBank, TcaState
 
-_DIVERGENCE = (
-    mujoco.mjtWarning.mjWARN_BADQPOS,
-    mujoco.mjtWarning.mjWARN_BADQVEL,
-    mujoco.mjtWarning.mjWARN_BADQACC,
-    mujoco.mjtWarning.mjWARN_BADCTRL,
-)
+# Warnings after which MuJoCo has reset the state by itself.
+_DIVERGENCE = {
+    int(warning): str(warning).rsplit("_", 1)[-1]
+    for warning in (
+        mujoco.mjtWarning.mjWARN_BADQPOS,
+        mujoco.mjtWarning.mjWARN_BADQVEL,
+        mujoco.mjtWarning.mjWARN_BADQACC,
+        mujoco.mjtWarning.mjWARN_BADCTRL,
+    )
+}
 
 
 class SimulationDiverged(ArithmeticError):
@@ -238,9 +242,9 @@ class Simulation:
     def _check(self) -> None:
         data = self.data
         number = data.warning.number
-        bad = [w for w in _DIVERGENCE if number[int(w)] > 0]
+        bad = [name for warning, name in _DIVERGENCE.items() if number[warning] > 0]
         if bad or not (np.isfinite(data.qpos).all() and np.isfinite(data.qvel).all()):
-            names = ", ".join(str(w).rsplit("_", 1)[-1] for w in bad) or "not finite"
+            names = ", ".join(bad) or "not finite"
             raise SimulationDiverged(
                 f"the state diverged at {data.time:.3f} s ({names}); a smaller timestep or less"
                 " power may help"
