@@ -130,6 +130,7 @@ class _Episode:
         self._tip = self.sim.model.site("arm.bending.tip").id
         self.ending = ""
         self.success = False
+        self.held_until = ""  # phase in which the arm last touched the object
         self.wall: dict[str, float] = defaultdict(float)
         self.left_out: dict[str, str] = {}
         self._film: Film | None = None
@@ -158,6 +159,8 @@ class _Episode:
         self.wall["recording"] = self._recorded()
         self._sample()
         self.success = bool(info.get("success", False))
+        if info.get("touched", False) and not self.success:
+            self.held_until = phase
         self.ending = how_it_ended(terminated, truncated, info) or ""
         if self._film is not None:
             with self._timed("video"):
@@ -179,6 +182,7 @@ class _Episode:
             "wall": {purpose: round(seconds, 3) for purpose, seconds in self.wall.items()},
             "real_time_factor": round(end / max(self.wall["simulation"], 1e-9), 2),
             "tries": self.policy.tries,
+            "held_until": self.held_until,
             "phases": [
                 {"name": name, "start": round(start, 6), "duration": round(until - start, 6)}
                 for (start, name), until in zip(self._phases, [*starts[1:], end], strict=True)

@@ -23,6 +23,8 @@ Action = NDArray[np.float32]
 # Objects, with the width that the gripper has to reach round [m].
 OBJECTS = {"screwdriver": 8e-3, "pcb": 3.6e-3}
 
+CAMERAS = ("front", "side", "close")
+
 OBSERVATION = Table(
     [
         Entry("base height", 1, 0.0, 0.3, "m"),
@@ -123,6 +125,11 @@ class ArmPickPlace(gym.Env[Observation, Action]):
                 f"render_mode must be None or one of {self.metadata['render_modes']},"
                 f" got {render_mode!r}"
             )
+        if camera not in CAMERAS:
+            raise ValueError(f"camera must be one of {CAMERAS}, got {camera!r}")
+        pixels = _numbers("size", size, (2,))
+        if pixels.min() < 1.0:
+            raise ValueError(f"size must be at least 1 pixel each way, got {size}")
         updates = self.control_period / (5.0 * timestep) if timestep > 0.0 else 0.0
         if not (np.isfinite(updates) and updates > 0.5 and abs(updates - round(updates)) < 1e-9):
             raise ValueError(
@@ -140,6 +147,7 @@ class ArmPickPlace(gym.Env[Observation, Action]):
         self._camera, self._size = camera, size
         self._screen: Offscreen | None = None
         self.object = "screwdriver"
+        self._in_cup, self._carried = 0, False
         self._find(self.model)
 
     def _find(self, model: mujoco.MjModel) -> None:
@@ -194,7 +202,7 @@ class ArmPickPlace(gym.Env[Observation, Action]):
 
         self.sim.reset(place)
         self._in_cup, self._carried = 0, False
-        return self._observe(), {"object": self.object, **self._info()}
+        return self._observe(), self._info()
 
     def _setup(self, options: Mapping[str, Any]) -> dict[str, Any]:
         """Draws what the options leave open. All draws are made, so that options shift none."""
@@ -210,24 +218,21 @@ class ArmPickPlace(gym.Env[Observation, Action]):
             "object_yaw": yaw,
             "cup_position": distance * np.array([np.cos(angle), np.sin(angle)]),
         }
-        unknown = sorted(set(options) - set(drawn))
+        unknown = [key for key in options if key not in drawn]
         if unknown:
             raise ValueError(f"options must be some of {sorted(drawn)}, got {unknown}")
         setup = drawn | dict(options)
-        if setup["object"] not in OBJECTS:
+        if setup["object"] not in list(OBJECTS):
             raise ValueError(f"object must be one of {sorted(OBJECTS)}, got {setup['object']!r}")
-        for key in ("object_position", "cup_position"):
-            value = np.asarray(setup[key], dtype=np.float64)
-            if value.shape != (2,) or not np.isfinite(value).all():
-                raise ValueError(f"{key} must be two finite numbers, got {setup[key]!r}")
-            setup[key] = value
+        for key, shape in (("object_position", (2,)), ("cup_position", (2,)), ("object_yaw", ())):
+            setup[key] = _numbers(key, setup[key], shape)
         if np.abs(setup["object_position"]).max() > reach + 1e-12:
             raise ValueError(
                 f"object_position must be within {reach} m of 0 in x and y,"
                 f" got {setup['object_position']}"
             )
         low, high = self.yaw_range
-        if not low <= float(setup["object_yaw"]) <= high:
+        if not low <= setup["object_yaw"] <= high:
             raise ValueError(
                 f"object_yaw must be between {low:.4f} and {high:.4f} rad,"
                 f" got {setup['object_yaw']}"
@@ -255,11 +260,9 @@ class ArmPickPlace(gym.Env[Observation, Action]):
         Raises:
             ValueError: If the action has the wrong shape, is not finite or out of [-1, 1].
         """
-        command = np.asarray(action, dtype=np.float64)
-        if command.shape != (ACTION.size,):
-            raise ValueError(f"action must have shape ({ACTION.size},), got {command.shape}")
-        if not (np.isfinite(command).all() and np.abs(command).max() <= 1.0 + 1e-6):
-            raise ValueError(f"action must be finite and within -1 and 1, got {command}")
+        command = _numbers("action", action, (ACTION.size,))
+        if np.abs(command).max() > 1.0 + 1e-6:
+            raise ValueError(f"action must be within -1 and 1, got {command}")
         command = np.clip(command, -1.0, 1.0)
         power = self.max_power * (command[:5] + 1.0) / 2.0
         self.data.ctrl[0] = self.arm_spec.speed * command[5]
@@ -282,7 +285,7 @@ class ArmPickPlace(gym.Env[Observation, Action]):
         success = self._in_cup >= 3 and reason is None
         terms["place"] = 20.0 if success else 0.0
         lost = bool(np.hypot(*self._position()[:2]) > 0.2)
-        info = {"reward_terms": terms, "success": success, "object": self.object, **self._info()}
+        info = {"reward_terms": terms, "success": success, **self._info()}
         if reason is not None:
             info["truncation_reason"] = reason
         if lost and not success:
@@ -374,6 +377,8 @@ class ArmPickPlace(gym.Env[Observation, Action]):
     def _info(self) -> dict[str, Any]:
         sim = self.sim
         return {
+            "object": self.object,
+            "touched": self._touched(),
             "time": sim.time,
             "energy": sim.energy.copy(),
             "temperature": sim.temperature.copy(),
@@ -403,3 +408,14 @@ class ArmPickPlace(gym.Env[Observation, Action]):
         if self._screen is not None:
             self._screen.close()
             self._screen = None
+
+
+def _numbers(name: str, value: Any, shape: tuple[int, ...]) -> NDArray[np.float64]:
+    """``value`` as real, finite numbers of the given shape, or a ``ValueError`` that names it."""
+    try:
+        array = np.asarray(value)
+        if array.shape == shape and array.dtype.kind in "iuf" and np.isfinite(array).all():
+            return array.astype(np.float64)
+    except (TypeError, ValueError):
+        pass
+    raise ValueError(f"{name} must be finite numbers of shape {shape}, got {value!r}")

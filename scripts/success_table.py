@@ -48,14 +48,16 @@ def table(results: Iterable[dict[str, Any]]) -> str:
     ordered = sorted(results, key=lambda r: (r["object"], r["seed"]))
     groups = {kind: [r for r in ordered if r["object"] == kind] for kind in OBJECTS}
     lines = [
-        "| object | episodes | in the cup | duration [s] | energy [J] | peak temperature [°C] |",
-        "|---|---|---|---|---|---|",
+        "| object | episodes | in the cup | held until released | duration [s] | energy [J]"
+        " | peak temperature [°C] |",
+        "|---|---|---|---|---|---|---|",
     ]
     for kind, group in [*groups.items(), ("all", ordered)]:
         if group:
             won = sum(r["success"] for r in group)
+            held = sum(r["held_until"] in ("release", "done") for r in group)
             lines.append(
-                f"| {kind} | {len(group)} | {won} ({100 * won / len(group):.0f} %)"
+                f"| {kind} | {len(group)} | {won} ({100 * won / len(group):.0f} %) | {held}"
                 f" | {_spread([r['duration'] for r in group])}"
                 f" | {_spread([_energy(r) for r in group])}"
                 f" | {_spread([_hottest(r) for r in group])} |"
@@ -65,14 +67,14 @@ def table(results: Iterable[dict[str, Any]]) -> str:
         "Duration, energy and peak temperature: median (least to most).",
         "",
         "| object | seed | ending | tries | duration [s] | energy [J] | peak temperature [°C]"
-        " | object from the cup's axis [mm] |",
-        "|---|---|---|---|---|---|---|---|",
+        " | touched until | object from the cup's axis [mm] |",
+        "|---|---|---|---|---|---|---|---|---|",
     ]
     for r in ordered:
         aside = np.hypot(*np.subtract(r["object_position"], r["cup_position"])[:2])
         lines.append(
             f"| {r['object']} | {r['seed']} | {r['ending']} | {r['tries']} | {r['duration']:.1f}"
-            f" | {_energy(r):.0f} | {_hottest(r):.0f} | {1e3 * aside:.1f} |"
+            f" | {_energy(r):.0f} | {_hottest(r):.0f} | {r['held_until']} | {1e3 * aside:.1f} |"
         )
     return "\n".join(lines)
 

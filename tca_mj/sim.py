@@ -200,6 +200,7 @@ class Simulation:
                 f" got {duration}"
             )
         model, data = self.model, self.data
+        self.power = power
         for _ in range(updates):
             length = self.length
             self._check_length(length)
@@ -212,7 +213,6 @@ class Simulation:
             self._hand_over(pull)
             mujoco.mj_step(model, data, self._substeps)
         self._check()
-        self.power = power
 
     def _hand_over(self, pull: Pull) -> None:
         """Gives MuJoCo the law F + k (l' - l) and the chains the stiffness they are owed."""
@@ -233,6 +233,7 @@ class Simulation:
     def _check_length(self, length: NDArray[np.float64]) -> None:
         inside = (length > self.bank.shortest) & (length < self.bank.longest)
         if not inside.all():
+            self._check()
             i = int(np.argmin(inside))
             raise SimulationDiverged(
                 f"{self.tca_names[i]} has a length of {length[i]:.5g} m at {self.time:.3f} s; its"

@@ -75,3 +75,9 @@ def test_tables_of_the_actuators_are_what_the_script_prints():
     page = (ROOT / "docs" / "tca.md").read_text(encoding="utf-8")
     for table in script["tables"]():
         assert table in page
+
+
+def test_the_arms_page_has_the_observation_table():
+    from tca_mj.envs.arm import OBSERVATION
+
+    assert OBSERVATION.markdown() in (ROOT / "docs" / "arm.md").read_text(encoding="utf-8")

@@ -87,7 +87,7 @@ def test_half_the_time_step_moves_the_tip_by_less_than_a_hundredth(module):
     build, nodes, site, length, hot = WORKING[module]
     coarse, fine = (
         tip(hold(simulation(build(nodes), timestep=step), hot, seconds=6.0), site)
-        for step in (4e-3, 2e-3)
+        for step in (5e-3, 2.5e-3)
     )
     assert np.linalg.norm(fine - coarse) < 1e-4 * length
 

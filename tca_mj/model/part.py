@@ -73,6 +73,8 @@ def new_spec(name: str) -> mujoco.MjSpec:
     spec.compiler.degree = False
     spec.compiler.autolimits = True
     option = spec.option
+    # A diverged state stays as it is, for the one who asks what happened.
+    option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
     option.integrator = mujoco.mjtIntegrator.mjINT_DISCRETE
     option.timestep = 2e-3
     option.solver = mujoco.mjtSolver.mjSOL_NEWTON

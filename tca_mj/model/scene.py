@@ -36,7 +36,9 @@ def scene(arena: Path, robot: Part, objects: Mapping[str, Path], *, name: str = 
     """
     spec = load(arena)
     settings = new_spec("scene").option
-    for field in ("integrator", "timestep", "solver", "jacobian", "cone", "impratio"):
+    for field in (
+        "integrator", "timestep", "solver", "jacobian", "cone", "impratio", "disableflags",
+    ):  # fmt: skip
         setattr(spec.option, field, getattr(settings, field))
     spec.compiler.degree = False
     origin = spec.worldbody.add_site(name="origin", group=4)

@@ -78,7 +78,6 @@ def settle(
     if (pull < 0.0).any():
         raise ValueError(f"tensions must be at least 0 N, got {pull}")
     mjspec = new_spec("settle")
-    mjspec.option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
     mjspec.option.gravity = _vector("gravity", gravity, 3)
     mjspec.option.timestep = _STEP * beam.length**2 * np.sqrt(beam.line_density / min(beam.bending))
     chain = build(mjspec.worldbody, beam, nodes=nodes, name="body", collide=False)

@@ -44,7 +44,8 @@ class FingerPairSpec:
         nodes: Nodes of each finger.
         friction: Sliding friction of the silicone. Estimate.
         tca: The kind of TCA, cut to the route's length in the closed gripper.
-        sheath_capacity: Heat capacity of the silicone heated with the TCA [J/K]. Estimate.
+        sheath_capacity: Heat capacity of the silicone heated with the TCA [J/K]. Estimate; its
+            heat is lost through the fibre's own surface.
 
     Raises:
         ValueError: If a dimension is not finite and positive, a number of nodes not whole, or the

@@ -1,5 +1,6 @@
 """The twisting module: a silicone cylinder wrapped by one TCA (Sun, Section 4.1.2)."""
 
+import math
 from dataclasses import dataclass, field, replace
 
 from tca_mj.model.chain import beam
@@ -47,7 +48,7 @@ class TwistingSpec:
     nodes: int = 10
     tca: TcaSpec = field(default_factory=lambda: CATALOGUE["free-stroke"])
     sheath_capacity: float = 0.39
-    sheath_area: float = 3.14159 * 3.2e-3
+    sheath_area: float = math.pi * 3.2e-3
 
     def __post_init__(self) -> None:
         require_positive(
