@@ -57,7 +57,7 @@ def matrix_quaternion(matrix: ArrayLike) -> Array:
     """Unit quaternion of one rotation matrix, shape (3, 3) -> (4,), with h0 >= 0.
 
     The eigenvector of Bar-Itzhack's symmetric matrix [J. Guidance 23(6), 2000]: no case
-    distinction, accurate for every angle, and the nearest rotation of a matrix that is slightly off.
+    distinction, accurate for every angle, and the nearest rotation of a matrix slightly off.
 
     Raises:
         ValueError: If the matrix is not a rotation (to 1e-6).
@@ -86,6 +86,70 @@ def running_product(quaternion: ArrayLike) -> Array:
         product[reach:] = quaternion_product(product[:-reach], product[reach:])
         reach *= 2
     return product
+
+
+def screw_translation(angle: ArrayLike, move: ArrayLike) -> Array:
+    """Where a steady screw motion takes the origin: translation of the exponential on SE(3).
+
+    Args:
+        angle: Rotation vector of the whole motion, shape (..., 3) [rad].
+        move: Translation in the moving frame, shape (..., 3) [m].
+
+    Returns:
+        Translation in the frame at the start: with t = |angle|, move + (1 - cos t)/t² angle x move
+        + (t - sin t)/t³ angle x (angle x move), shape (..., 3) [m].
+    """
+    angle, move = np.asarray(angle, dtype=np.float64), np.asarray(move, dtype=np.float64)
+    size = np.linalg.norm(angle, axis=-1, keepdims=True)
+    first = 0.5 * np.square(np.sinc(size / (2.0 * np.pi)))
+    small = size < 0.1
+    safe = np.where(small, 1.0, size)
+    # Below 0.1 the series: t - sin t would lose digits; what is left out is below 1e-15.
+    t2 = np.square(size)
+    series = 1 / 6 - t2 / 120 * (1 - t2 / 42 * (1 - t2 / 72 * (1 - t2 / 110)))
+    second = np.where(small, series, (safe - np.sin(safe)) / safe**3)
+    across = np.cross(angle, move)
+    moved: Array = move + first * across + second * np.cross(angle, across)
+    return moved
+
+
+def integrate_strain(
+    angular: ArrayLike, linear: ArrayLike, step: float, start: ArrayLike
+) -> tuple[Array, Array]:
+    """Solves h' = h u/2 and p' = R v, p(0) = 0, from strains in the moving frame.
+
+    Magnus's expansion of fourth order on rigid motions: exact where the strains are constant.
+
+    Args:
+        angular: Turn per length u at nodes and middles in turn, shape (2 n + 1, 3) [rad/m].
+        linear: Stretch v there, shape (2 n + 1, 3).
+        step: Distance of the nodes [m].
+        start: Quaternion at the first node, shape (4,).
+
+    Returns:
+        Quaternions, shape (n + 1, 4), and positions [m] at the nodes, shape (n + 1, 3).
+    """
+    u, v = np.asarray(angular, dtype=np.float64), np.asarray(linear, dtype=np.float64)
+    u0, v0, u1, v1 = u[:-2:2], v[:-2:2], u[2::2], v[2::2]
+    angle = step / 6.0 * (u0 + 4.0 * u[1::2] + u1) + step**2 / 12.0 * np.cross(u0, u1)
+    move = step / 6.0 * (v0 + 4.0 * v[1::2] + v1)
+    move += step**2 / 12.0 * (np.cross(u0, v1) + np.cross(v0, u1))
+    quaternion = running_product(np.vstack([start, quaternion_exp(angle)]))
+    pieces = np.einsum(
+        "nij,nj->ni", quaternion_matrix(quaternion[:-1]), screw_translation(angle, move)
+    )
+    return quaternion, np.vstack([np.zeros(3), np.cumsum(pieces, axis=0)])
+
+
+def quaternion_log(quaternion: ArrayLike) -> Array:
+    """Rotation vectors, of length pi at most, of quaternions, shape (..., 4) -> (..., 3) [rad]."""
+    h = np.asarray(quaternion, dtype=np.float64)
+    h = np.where(h[..., :1] < 0.0, -h, h)
+    size = np.linalg.norm(h[..., 1:], axis=-1, keepdims=True)
+    half = np.arctan2(size, h[..., :1])
+    # size/scalar is tan(half): dividing by the larger of the two loses nothing near zero.
+    safe = np.where(size > 0.0, size, 1.0)
+    return np.where(size > 0.0, 2.0 * half / safe, 2.0) * h[..., 1:]
 
 
 def hat(vector: ArrayLike) -> Array:

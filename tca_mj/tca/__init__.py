@@ -1,33 +1,54 @@
 """Physics of twisted-and-coiled actuators (TCAs): heat, tension, resistance; n at a time."""
 
 from tca_mj.tca.bank import Pull, TcaBank, TcaState
+from tca_mj.tca.centreline import CONICAL, Centreline, ConicalTca
+from tca_mj.tca.coilbvp import FibreShape, Stiffness, fibre_stiffness, solve_fibre
 from tca_mj.tca.coilrod import CoilRods, CoilSolveError, Helix, coil_tension
 from tca_mj.tca.moduli import FibreTable, radial_growth, softened_tension, softening, untwist
 from tca_mj.tca.sensing import WireTable, resistance, sensed_length
-from tca_mj.tca.spec import CATALOGUE, FibreSpec, TcaSpec
+from tca_mj.tca.spec import CATALOGUE, FREE_STROKE_CREPT, FibreSpec, TcaSpec
+from tca_mj.tca.statics import beyond_breaking, hanging_length, outside_fit, tension
+from tca_mj.tca.surface import CalibrationError, CoilSurfaces, Surface, SurfaceBound, calibrate
 from tca_mj.tca.thermal import HeatSpec, heat_lost, power_from_voltage, step_temperature
 
 __all__ = [
     "CATALOGUE",
+    "CONICAL",
+    "CalibrationError",
+    "Centreline",
     "CoilRods",
     "CoilSolveError",
+    "CoilSurfaces",
+    "ConicalTca",
+    "FREE_STROKE_CREPT",
+    "FibreShape",
     "FibreSpec",
     "FibreTable",
     "HeatSpec",
     "Helix",
     "Pull",
+    "Stiffness",
+    "Surface",
+    "SurfaceBound",
     "TcaBank",
     "TcaSpec",
     "TcaState",
     "WireTable",
+    "beyond_breaking",
+    "calibrate",
     "coil_tension",
+    "fibre_stiffness",
+    "hanging_length",
     "heat_lost",
+    "outside_fit",
     "power_from_voltage",
     "radial_growth",
     "resistance",
     "sensed_length",
     "softened_tension",
     "softening",
+    "solve_fibre",
     "step_temperature",
+    "tension",
     "untwist",
 ]

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -9,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from tca_mj.tca.coilrod import CoilRods
 from tca_mj.tca.sensing import WireTable, resistance
 from tca_mj.tca.spec import TcaSpec
+from tca_mj.tca.surface import CoilSurfaces
 from tca_mj.tca.thermal import HeatSpec, heat_lost, power_from_voltage, step_temperature
 
 Array = NDArray[np.float64]
@@ -60,6 +62,7 @@ class TcaBank:
     Attributes:
         specs: The n specs.
         n: Number of TCAs.
+        law: What computes tension and stiffness.
         heat: Thermal constants, fields of shape (n,).
         rest_length: Natural lengths, shape (n,) [m].
         minimum_length: Lengths at which the coils touch, shape (n,) [m].
@@ -69,12 +72,27 @@ class TcaBank:
         max_temperature: Upper ends of the range of the fibre's measurements, shape (n,) [°C].
     """
 
-    def __init__(self, specs: Sequence[TcaSpec]) -> None:
+    def __init__(self, specs: Sequence[TcaSpec], law: Literal["rod", "surface"] = "rod") -> None:
+        """Gathers the constants of ``specs``, and their surfaces if ``law`` needs them.
+
+        Args:
+            specs: The TCAs, at least one.
+            law: "rod" solves rod theory anew each time; "surface" reads it from a table with a
+                known error (``surface.SurfaceBound``), made on first use: a third of the time.
+
+        Raises:
+            ValueError: If ``specs`` is empty or there is no such ``law``.
+            CalibrationError: If no table follows the rod of a TCA closely enough.
+        """
         self.specs = tuple(specs)
         self.n = len(self.specs)
         if self.n == 0:
             raise ValueError("specs is empty; a bank needs at least 1 TCA")
-        self._rods = CoilRods(self.specs)
+        if law not in ("rod", "surface"):
+            raise ValueError(f"law = {law!r} must be 'rod' or 'surface'")
+        self.law = law
+        self._coils: CoilRods | CoilSurfaces
+        self._coils = CoilSurfaces(self.specs) if law == "surface" else CoilRods(self.specs)
         self._wire = WireTable.of(self.specs)
         heats = [spec.heat for spec in self.specs]
         self.heat = HeatSpec(
@@ -84,7 +102,7 @@ class TcaBank:
         )
         self.rest_length = _frozen([spec.rest_length for spec in self.specs])
         self.minimum_length = _frozen([spec.minimum_length for spec in self.specs])
-        self.shortest, self.longest = self._rods.shortest, self._rods.longest
+        self.shortest, self.longest = self._coils.shortest, self._coils.longest
         self.breaking_force = _frozen([spec.breaking_force for spec in self.specs])
         self.max_temperature = _frozen([spec.fibre.temperature_range[1] for spec in self.specs])
 
@@ -113,7 +131,7 @@ class TcaBank:
             CoilSolveError: If the shape of a coil is not found.
         """
         length = self._checked(state, "length", length)
-        tension, stiffness = self._rods.tension(length, state.temperature)
+        tension, stiffness = self._coils.tension(length, state.temperature)
         return Pull(tension, stiffness, length)
 
     def advance(

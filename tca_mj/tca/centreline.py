@@ -17,7 +17,6 @@ from tca_mj.rod.lie import (
     matrix_quaternion,
     quaternion_exp,
     quaternion_matrix,
-    quaternion_product,
     running_product,
 )
 from tca_mj.tca.spec import CATALOGUE, FibreSpec, TcaSpec

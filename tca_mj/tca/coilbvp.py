@@ -1,67 +1,36 @@
 """A fibre of any shape under heat and a dead load: the full boundary value problem of the rod.
 
-In the frame of the section, with u = u* + untwist e_z + K_bt^-1 m and v = e_z + K_se^-1 n, the
-balance of Sun, dissertation, Colorado State University, eqs. (3.6) to (3.8), reads
-
-    m' = m x u + n x v        n' = n x u        R' = R hat(u)        p' = R v.
-
-The base is clamped: R(0) and p(0) are given. A force F that keeps its direction acts at the
-fibre's end, where the moment is M, zero by default. F is the same in every section,
-n = R^T F, which is why the problem needs no orientations: n(0) = R(0)^T F at the base and
-m(l_t) = M at the end (a moment M that is fixed in the world is carried along like n). That
-leaves 6 (with M 9) smooth unknowns per section, constants for a uniform helix, and no
-unknowns at all for a fibre without load. Frames and positions follow by integrating
-h' = h u/2 and p' = R v (Section 3.4.2).
-
-Collocation with Lobatto's three points (fourth order) turns this into banded equations; Newton
-solves them along a path on which first the load grows and then the heat, as in an
-experiment, and the mesh is halved until the end of the fibre stays where it is.
+Sun, dissertation, Colorado State University, eqs. (3.5) to (3.8), for one fibre whose base is
+clamped, whose other end carries a force of fixed direction *at the fibre itself*, and is free to
+turn (or carries a moment too). Unlike ``coilrod``, which needs a uniform helix, this takes every
+centre line, and knows the end turns of the coil. The wrench is found by ``rod.deadload``, the
+shape then by integrating h' = h u/2, p' = R v (Section 3.4.2), exactly for constant strain.
 """
 
+import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.linalg import LinAlgError, solve_banded
 
-from tca_mj.rod.lie import (
-    hat,
-    matrix_quaternion,
-    quaternion_exp,
-    quaternion_matrix,
-    quaternion_product,
-    running_product,
-)
+from tca_mj.rod.deadload import DeadLoad, RodSolveError
+from tca_mj.rod.equilibrium import follow
+from tca_mj.rod.lie import integrate_strain, matrix_quaternion, quaternion_matrix
 from tca_mj.tca.centreline import Centreline
 from tca_mj.tca.moduli import radial_growth, softening, untwist
 from tca_mj.tca.spec import FibreSpec
 
 Array = NDArray[np.float64]
 
-_RESIDUAL = 1e-11  # Newton's goal: change of the scaled wrench that a step leaves unexplained
-_NEWTON_STEPS = 12
-_SMALLEST_STEP = 1e-4  # of the path from the unloaded cold to the loaded hot fibre
-_PER_TURN = 12  # intervals of the first mesh per turn of the frame
-_FINEST = 60_000  # intervals
-
-
-class RodSolveError(ArithmeticError):
-    """The shape of a fibre was not found.
-
-    Attributes:
-        residual: What is left: Newton's largest residual, or the change of the end between the
-            two finest meshes over the length of the fibre [1].
-    """
-
-    def __init__(self, what: str, residual: float, allowed: float) -> None:
-        super().__init__(f"fibre not solved: {what}; {residual:.3g} is left, allowed {allowed:.3g}")
-        self.residual = residual
+_PER_TURN = 10  # intervals of the first mesh per turn of the frame
+_ATTEMPTS = 3  # meshes on which the path is tried, each twice as fine as the one before
+_FINEST = 50_000  # intervals
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FibreShape:
-    """A solved fibre at n sections from base to end; the first axis of every array.
+    """A solved fibre at n sections from base to end, the first axis of every array.
 
     Attributes:
         arc_length: Position along the unloaded fibre, shape (n,) [m].
@@ -71,8 +40,8 @@ class FibreShape:
         linear: Stretch v in the section's frame, (0, 0, 1) if unloaded, shape (n, 3).
         moment: Internal moment m in the section's frame, shape (n, 3) [N m].
         force: Internal force n in the section's frame, shape (n, 3) [N].
-        error: Estimated error of the end's position [m].
-        residual: Largest residual of the collocation equations [1].
+        residual: Largest residual of the scaled equations.
+        error: Estimated error of the end's position, NaN if only one mesh was solved [m].
     """
 
     arc_length: Array
@@ -82,12 +51,12 @@ class FibreShape:
     linear: Array
     moment: Array
     force: Array
-    error: float
     residual: float
+    error: float
 
     @property
     def end(self) -> Array:
-        """Position of the fibre's end, shape (3,) [m]."""
+        """Position of the fibre's end, world frame, shape (3,) [m]."""
         return self.position[-1]
 
     @property
@@ -97,7 +66,7 @@ class FibreShape:
 
 
 class Stiffness(NamedTuple):
-    """K of Sun, eq. (3.8): bending EI [N m²], torsion GJ [N m²], shear GA [N], stretch EA [N]."""
+    """Section of Sun, eq. (3.8): bending EI, torsion GJ [N m²], shear GA, stretch EA [N]."""
 
     bending: float
     torsion: float
@@ -106,7 +75,7 @@ class Stiffness(NamedTuple):
 
 
 def fibre_stiffness(fibre: FibreSpec, temperature: float, torsion: float = 0.0) -> Stiffness:
-    """Stiffness of the fibre's section, softened and, if it is of the "hot" kind, grown.
+    """Stiffness of the fibre's section: softened, and grown if ``fibre.section`` is "hot".
 
     Args:
         fibre: The fibre.
@@ -130,74 +99,151 @@ def solve_fibre(
     force: ArrayLike = (0.0, 0.0, 0.0),
     moment: ArrayLike = (0.0, 0.0, 0.0),
     *,
-    tolerance: float = 1e-7,
+    tolerance: float = 1e-6,
     intervals: int | None = None,
 ) -> FibreShape:
-    """Shape of a fibre, one end clamped, under heat and a dead load at its other end.
+    """Shape of a fibre, one end clamped, under heat and a dead load on its other end.
 
-    The fibre does not touch itself, and its own weight is left out. The load softens it by the
-    torsion F r_t cos(alpha)/(G J) [Sun, eq. (3.11)] if it pulls; sin(alpha) is the rise of the
-    reference shape along F over the fibre's length, which for a helix is the pitch angle.
+    The fibre may pass through itself (coils in contact are not known), and its own weight is left
+    out. The load softens it [Sun, eq. (3.11)] if it pulls, by the torsion
+    F r_t cos(alpha)/(G J); sin(alpha) is the rise of the reference shape along F over the
+    fibre's length, the pitch angle of a helix.
 
     Args:
-        centreline: Reference shape and clamp.
+        centreline: Reference shape, and place and frame of the clamp.
         fibre: The twisted fibre.
         temperature: Temperature [°C].
         force: Force at the fibre's end, world frame, shape (3,) [N].
-        moment: Moment on the fibre's end, world frame, shape (3,) [N m]; zero lets it spin.
-        tolerance: Allowed error of the end's position over the length of the fibre.
-        intervals: A mesh of so many equal intervals and no other; ``error`` is then NaN. By
-            default the mesh is refined until ``tolerance`` is met.
+        moment: Moment on the fibre's end, world frame, shape (3,); zero lets it spin [N m].
+        tolerance: Allowed error of the end's position over the fibre's length.
+        intervals: Solves on one mesh of so many equal intervals, whatever its error. By default
+            the mesh is refined until ``tolerance`` is met.
 
     Raises:
-        ValueError: If a number is not finite, or the temperature leaves no modulus.
-        RodSolveError: If Newton's method fails on the way or the finest mesh misses the tolerance.
+        ValueError: If an argument is not finite or too small, or no modulus is left.
+        RodSolveError: If Newton's method does not converge, or the finest mesh is too coarse.
     """
-    load = np.asarray(force, dtype=np.float64), np.asarray(moment, dtype=np.float64)
-    for name, vector in zip(("force", "moment"), load, strict=True):
+    force, moment = np.asarray(force, dtype=np.float64), np.asarray(moment, dtype=np.float64)
+    for name, vector in (("force", force), ("moment", moment)):
         if vector.shape != (3,) or not np.all(np.isfinite(vector)):
             raise ValueError(f"{name} must be three finite numbers, got {vector}")
-    if not -273.15 < temperature < np.inf:
+    if not -273.15 < temperature < math.inf:
         raise ValueError(f"temperature = {temperature} °C must be finite and above -273.15")
     if not tolerance > 0.0:
         raise ValueError(f"tolerance = {tolerance} must be above 0")
     if intervals is not None and intervals < 1:
         raise ValueError(f"intervals = {intervals} must be at least 1")
     twist = float(untwist(fibre, temperature))
-    problem = _Problem.of(centreline, fibre, temperature, load)
+    torsion = _load_torsion(centreline, fibre, force)
+    stiffness = fibre_stiffness(fibre, temperature, torsion)
     if intervals is not None:
-        mesh = problem.mesh(intervals)
-        return problem.shape(mesh, *problem.follow(mesh, twist), twist, np.nan)
-    count = problem.first_count(twist)
-    mesh = problem.mesh(count)
-    state, residual = problem.follow(mesh, twist)
-    shape = problem.shape(mesh, state, residual, twist, np.nan)
+        problem, scale = _scaled(centreline, stiffness, twist, force, moment, intervals)
+        return _shape(centreline, stiffness, problem, scale, *follow(problem))
+
+    turns = _turns(centreline, twist)
+    count = max(8, math.ceil(_PER_TURN * turns))
+    for attempt in range(_ATTEMPTS):
+        problem, scale = _scaled(centreline, stiffness, twist, force, moment, count)
+        try:
+            state, residual = follow(problem)
+            break
+        except RodSolveError:
+            if attempt == _ATTEMPTS - 1:
+                raise
+            count *= 2
+    shape = _shape(centreline, stiffness, problem, scale, state, residual)
     while True:
         count *= 2
-        mesh = problem.mesh(count)
-        middle = 0.5 * (state[1:] + state[:-1])
-        guess = np.empty((count + 1, state.shape[1]))
-        guess[::2], guess[1::2] = state, middle
-        state, residual = problem.newton(mesh, guess, 1.0, twist)
-        if state is None:
-            raise RodSolveError("Newton failed on a finer mesh", residual, _RESIDUAL)
-        finer = problem.shape(mesh, state, residual, twist, np.nan)
-        change = float(np.linalg.norm(finer.end - shape.end)) / centreline.length
-        # Fourth order: what is left is a fifteenth of the last change.
-        if change / 15.0 <= tolerance:
-            return problem.shape(mesh, state, residual, twist, change / 15.0 * centreline.length)
+        problem, scale = _scaled(centreline, stiffness, twist, force, moment, count)
+        guess = np.empty((count + 1, problem.size))
+        guess[::2] = state
+        guess[1::2] = 0.5 * (state[1:] + state[:-1])
+        state, residual = problem.newton(guess)
+        # Fourth order: a fifteenth of the last change is left.
+        finer = _shape(centreline, stiffness, problem, scale, state, residual, shape.end)
+        if finer.error <= tolerance * centreline.length:
+            return finer
         if 2 * count > _FINEST:
-            raise RodSolveError("the finest mesh is too coarse", change / 15.0, tolerance)
+            raise RodSolveError("the finest mesh is too coarse", finer.error / centreline.length)
         shape = finer
 
 
-class _Mesh(NamedTuple):
-    step: float  # scaled length of an interval
-    reference: Array  # scaled u* at nodes and middles, shape (2 n + 1, 3)
-    arc: Array  # at nodes [m]
+def _turns(centreline: Centreline, twist: float) -> float:
+    """Turns of the heated, unloaded fibre's frame."""
+    at = np.linspace(0.0, centreline.length, 257)
+    rate = np.linalg.norm(centreline.strain(at) + [0.0, 0.0, twist], axis=1)
+    return float(np.mean(rate)) * centreline.length / (2.0 * math.pi)
 
 
-class _Problem:
-    """The equations, scaled: lengths by the fibre's mean radius of curvature, moments by GJ."""
+def _load_torsion(centreline: Centreline, fibre: FibreSpec, force: Array) -> float:
+    """Torsion by which a pulling force softens the fibre, 0 if it pushes [rad/m]."""
+    size = float(np.linalg.norm(force))
+    if size == 0.0 or fibre.load_softening[:2] == (0.0, 0.0):
+        return 0.0
+    count = max(64, math.ceil(4 * _PER_TURN * _turns(centreline, 0.0)))
+    u = centreline.strain(np.linspace(0.0, centreline.length, 2 * count + 1))
+    v = np.broadcast_to([0.0, 0.0, 1.0], u.shape)
+    start = matrix_quaternion(centreline.rotation)
+    _, position = integrate_strain(u, v, centreline.length / count, start)
+    sin = float(position[-1] @ force) / (size * centreline.length)
+    if sin <= 0.0:
+        return 0.0
+    cold = 2.0 * fibre.shear * fibre.second_moment
+    return size * fibre.radius * math.sqrt(max(0.0, 1.0 - sin * sin)) / cold
 
-    def __init__(self) -> None: ...
+
+def _scaled(
+    centreline: Centreline,
+    stiffness: Stiffness,
+    twist: float,
+    force: Array,
+    moment: Array,
+    intervals: int,
+) -> tuple[DeadLoad, float]:
+    """The problem in units of a length a and of GJ, and a: the mean radius of the frame's turn."""
+    arc = np.linspace(0.0, centreline.length, 2 * intervals + 1)
+    reference = np.asarray(centreline.strain(arc), dtype=np.float64)
+    mean = float(np.mean(np.linalg.norm(reference, axis=1)))
+    scale = 1.0 / max(mean, 1.0 / centreline.length)
+    vectors = force[None] * (scale**2 / stiffness.torsion)
+    if moment.any():
+        vectors = np.vstack([vectors, moment * (scale / stiffness.torsion)])
+    ratio = stiffness.torsion / stiffness.bending
+    stretch = np.array([stiffness.shear, stiffness.shear, stiffness.stretch])
+    return DeadLoad(
+        step=centreline.length / intervals / scale,
+        reference=scale * reference,
+        heat=np.array([0.0, 0.0, scale * twist]),
+        angular=np.array([ratio, ratio, 1.0]),
+        linear=stiffness.torsion / scale**2 / stretch,
+        vectors=vectors @ centreline.rotation,
+    ), scale
+
+
+def _shape(
+    centreline: Centreline,
+    stiffness: Stiffness,
+    problem: DeadLoad,
+    scale: float,
+    state: Array,
+    residual: float,
+    coarser: Array | None = None,
+) -> FibreShape:
+    """The shape that belongs to a solved wrench, in metres and newtons."""
+    u, v = problem.strain(state)
+    u /= scale
+    step = centreline.length / problem.intervals
+    quaternion, moved = integrate_strain(u, v, step, matrix_quaternion(centreline.rotation))
+    position = centreline.position + moved
+    change = math.nan if coarser is None else float(np.linalg.norm(position[-1] - coarser))
+    return FibreShape(
+        arc_length=np.linspace(0.0, centreline.length, problem.intervals + 1),
+        position=position,
+        quaternion=quaternion,
+        angular=u[::2],
+        linear=v[::2],
+        moment=state[:, :3] * (stiffness.torsion / scale),
+        force=state[:, 3:6] * (stiffness.torsion / scale**2),
+        residual=residual,
+        error=change / 15.0,
+    )

@@ -12,6 +12,7 @@ from numbers import Real
 from types import MappingProxyType
 from typing import Literal
 
+from tca_mj.tca.mandrel import BRILL_TRANSITION, kept_share
 from tca_mj.tca.thermal import HeatSpec
 
 _ABSOLUTE_ZERO = -273.15  # [°C]
@@ -53,6 +54,8 @@ class FibreSpec:
         reference_temperature: Temperature T_0 at which the TCA has its natural shape [°C].
         temperature_range: Lowest and highest temperature of the measurements behind
             ``expansion`` and ``softening`` [°C]; the laws extrapolate beyond it.
+        melting_temperature: Temperature above which there is no fibre [°C]: an estimate from
+            handbook values of nylon 6,6, 255 to 265 °C.
         section: Whether A, I and J belong to the cold radius or grow with Gamma. An open
             choice, not settled by the source: "cold" is an assumption.
     """
@@ -70,6 +73,7 @@ class FibreSpec:
     specific_heat: float = 1267.0
     reference_temperature: float = 25.0
     temperature_range: tuple[float, float] = (25.0, 160.0)
+    melting_temperature: float = 260.0
     section: Literal["cold", "hot"] = "cold"
 
     def __post_init__(self) -> None:
@@ -95,6 +99,7 @@ class FibreSpec:
                 f"temperature_range = {self.temperature_range} must be above {_ABSOLUTE_ZERO} and "
                 f"hold the reference_temperature {self.reference_temperature} below its upper end"
             )
+        _require("melting_temperature", self.melting_temperature, above=high)
         mu2, mu1, mu0 = self.load_softening
         if not (mu2 >= 0.0 and mu0 > 0.0 and (mu1 >= 0.0 or mu1 * mu1 < 4.0 * mu2 * mu0)):
             raise ValueError(
@@ -199,6 +204,59 @@ class TcaSpec:
                 f"stretch; it must be below {1.0 / (1.0 / math.sin(self.pitch_angle) - 1.0)}"
             )
 
+    @classmethod
+    def from_mandrel(
+        cls,
+        *,
+        fibre: FibreSpec,
+        fibre_length: float,
+        core_diameter: float,
+        groove_pitch_angle: float,
+        annealing_temperature: float | None = None,
+        minimum_pitch_angle: float | None = None,
+    ) -> "TcaSpec":
+        """A TCA from its making: fibre in a helical groove, annealed; Sun, Section 2.1.1.
+
+        The made length is fibre_length sin(groove pitch), the radius on the mandrel is (core +
+        fibre diameter)/2. Off it the coil keeps its turns and creeps to its natural length,
+        contact length + ``kept_share`` (made length - contact length).
+
+        Args:
+            fibre: The twisted fibre.
+            fibre_length: Its length in the coil [m].
+            core_diameter: Diameter of the mandrel's core, the coil's inner diameter [m].
+            groove_pitch_angle: Pitch angle of the groove, alpha_m [rad].
+            annealing_temperature: Temperature of the oven [°C]; None for the coil as made.
+            minimum_pitch_angle: Pitch angle at which the coils touch; None is close packing,
+                asin(r_t/(pi r)), 8.4° in Table 2.1, where real threads touch at 11.53° [rad].
+
+        Returns:
+            The TCA at its natural length, other numbers at their defaults.
+
+        Raises:
+            ValueError: If a number is out of range or the coils touch (annealed too cold).
+        """
+        _require("fibre_length", fibre_length, above=0.0)
+        _require("core_diameter", core_diameter, above=0.0)
+        _require("groove_pitch_angle", groove_pitch_angle, above=0.0, below=math.pi / 2.0)
+        radius = 0.5 * core_diameter + fibre.radius
+        if minimum_pitch_angle is None:
+            minimum_pitch_angle = math.asin(fibre.radius / (math.pi * radius))
+        _require("minimum_pitch_angle", minimum_pitch_angle, above=0.0, below=groove_pitch_angle)
+        kept = 1.0
+        if annealing_temperature is not None:
+            _require("annealing_temperature", annealing_temperature, above=BRILL_TRANSITION,
+                     below=fibre.melting_temperature)  # fmt: skip
+            kept = kept_share(groove_pitch_angle, annealing_temperature)
+        contact, made = math.sin(minimum_pitch_angle), math.sin(groove_pitch_angle)
+        return cls(
+            fibre=fibre,
+            fibre_length=fibre_length,
+            coil_radius=radius,
+            pitch_angle=groove_pitch_angle,
+            minimum_pitch_angle=minimum_pitch_angle,
+        ).of_pitch(math.asin(contact + kept * (made - contact)))
+
     @property
     def rest_length(self) -> float:
         """Natural length l_t sin(alpha*): no load, reference temperature [m]."""
@@ -208,6 +266,11 @@ class TcaSpec:
     def minimum_length(self) -> float:
         """Length at which neighbouring coils touch [m]."""
         return self.fibre_length * math.sin(self.minimum_pitch_angle)
+
+    @property
+    def free_stroke(self) -> float:
+        """Contraction without load until the coils touch, over the natural length [1]."""
+        return 1.0 - self.minimum_length / self.rest_length
 
     @property
     def winding(self) -> float:
@@ -246,6 +309,15 @@ class TcaSpec:
             sheath_capacity=scale * self.sheath_capacity,
             sheath_area=None if self.sheath_area is None else scale * self.sheath_area,
         )
+
+    def of_pitch(self, pitch_angle: float) -> "TcaSpec":
+        """The same coil crept to another natural pitch angle [rad]; it keeps its turns.
+
+        The coil's radius follows, cos(pitch)/winding; the contact length stays.
+        """
+        _require("pitch_angle", pitch_angle, above=0.0, below=math.pi / 2.0)
+        radius = math.cos(pitch_angle) / self.winding
+        return replace(self, pitch_angle=pitch_angle, coil_radius=radius)
 
 
 # Sun, Section 2.1.1 and Table 2.1: thread of 0.34 mm diameter with 287 turns on 350 mm. The
@@ -300,6 +372,16 @@ _SELF_COILED = TcaSpec(
     pitch_angle=math.radians(18.66),
     minimum_pitch_angle=math.asin(0.42 / (2.0 * math.pi * 0.227)),
     breaking_force=0.240 * 9.81,
+)
+
+# The free-stroke TCA after it has crept under a weight in grams, which is its reference under that
+# weight: pitch angles in the code published with Sun et al., github.com/jiefengsun/TCA-TRO. 15°
+# at 0 g is the natural length.
+FREE_STROKE_CREPT: Mapping[str, TcaSpec] = MappingProxyType(
+    {
+        f"{weight} g": _FREE_STROKE_MADE.of_pitch(math.radians(pitch))
+        for weight, pitch in ((0, 15.0), (2, 16.0), (30, 20.0), (60, 22.0))
+    }
 )
 
 CATALOGUE: Mapping[str, TcaSpec] = MappingProxyType(
