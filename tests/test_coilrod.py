@@ -36,8 +36,7 @@ class Theory:
         self.tau = tau + fibre.inserted_twist * fibre.untwist_scale * (1.0 / gamma - 1.0)
         self.fall = fibre.softening / fibre.filament_young * (temperature - t0)
         self.mu = fibre.load_softening
-        cold = fibre.shear * math.pi * fibre.radius**4 / 2.0
-        self.torsion_per_tension = fibre.radius * math.cos(spec.pitch_angle) / cold
+        self.torsion_per_tension = radius * math.cos(spec.pitch_angle) / self.GJ
 
     def left(self, tension):
         torsion = self.torsion_per_tension * max(tension, 0.0)

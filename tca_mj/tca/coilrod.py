@@ -158,9 +158,8 @@ class CoilRods:
         """
         length, temperature = self._checked(length, temperature)
         _, stiff, slope = self._solve(length, temperature)
-        tension, share = softened_tension(
-            self._fibres, temperature, stiff, self._torsion_per_tension
-        )
+        per_tension = self.torsion_per_tension(temperature)
+        tension, share = softened_tension(self._fibres, temperature, stiff, per_tension)
         contact, contact_slope = self._contact(length)
         return tension - contact, share * slope + contact_slope
 
@@ -168,9 +167,10 @@ class CoilRods:
         """Shape and loads of the coils, contact left out; arguments and errors as ``tension``."""
         length, temperature = self._checked(length, temperature)
         sin, stiff, _ = self._solve(length, temperature)
-        tension, _ = softened_tension(self._fibres, temperature, stiff, self._torsion_per_tension)
+        per_tension = self.torsion_per_tension(temperature)
+        tension, _ = softened_tension(self._fibres, temperature, stiff, per_tension)
         # Not F/f, which is 0/0 for a coil at rest.
-        share = softening(self._fibres, temperature, self._torsion_per_tension * tension)
+        share = softening(self._fibres, temperature, per_tension * tension)
         cos = np.sqrt(1.0 - sin * sin)
         section = self._section(temperature)
         radius = (cos + stiff * sin * cos * section.excess) / self._winding
@@ -206,6 +206,13 @@ class CoilRods:
         if not ((temperature > -273.15) & (temperature < np.inf)).all():
             raise ValueError(f"temperature = {temperature} °C must be finite and above -273.15")
         return length, temperature
+
+    def torsion_per_tension(self, temperature: Array) -> Array:
+        """Torsion τ = F r_t cos α*/(G J) of the fibre per tension, of its section [rad/(m N)]."""
+        if not self._any_hot:
+            return self._torsion_per_tension
+        growth = np.where(self._hot, 1.0 + radial_growth(self._fibres, temperature), 1.0)
+        return self._torsion_per_tension / (growth * growth * growth)
 
     def _section(self, temperature: Array) -> _Section:
         """Constants of the scalar law at the moduli of the reference temperature."""

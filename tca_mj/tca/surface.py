@@ -194,7 +194,7 @@ class CoilSurfaces:
         i, j = np.floor(x), np.floor(t)
         cell = (i * self._row + (j + self._offset)).astype(np.intp)
         stiff, slope = _polynomial(self._table.take(cell, axis=1), x - i, t - j)
-        per = rods._torsion_per_tension
+        per = rods.torsion_per_tension(temperature)
         tension, share = softened_tension(rods._fibres, temperature, stiff, per)
         slope = slope * self._per_metre * share
         if not (length < self._minimum).any():
@@ -301,9 +301,10 @@ def _measured(coil: TcaSpec, rods: CoilRods, surface: Surface) -> SurfaceBound:
     length = np.linspace(surface.shortest, surface.longest, _FINER * p + 1)
     temperature = np.linspace(surface.coldest, surface.hottest, _FINER * q + 1)
     # A spec may soften to nothing below the table's upper end; there the law raises anyway.
-    fibre, per = coil.fibre, rods._torsion_per_tension[0]
+    fibre = coil.fibre
     fall = fibre.softening_rate * fibre.load_softening[2]
     temperature = temperature[fall * (temperature - fibre.reference_temperature) < 1.0]
+    per = rods.torsion_per_tension(temperature[:, None])[..., 0]
     per_length = p / (surface.longest - surface.shortest)
     x = (length[:, None] - surface.shortest) * per_length
     t = (temperature - surface.coldest) * (q / (surface.hottest - surface.coldest))
