@@ -17,9 +17,10 @@ from tqdm import tqdm
 from tca_mj.agents.scripted import PickAndPlace
 from tca_mj.envs.arm import OBSERVATION, ArmPickPlace
 from tca_mj.envs.wrappers import RecordRerun, how_it_ended
+from tca_mj.film import Film
 from tca_mj.machine import machine, versions
 from tca_mj.plots import rollout_plot
-from tca_mj.render import Film, RenderingUnavailable
+from tca_mj.render import RenderingUnavailable
 
 TASK = "TCA/ArmPickPlace-v0"
 SUMMARY, RECORDING, VIDEO, PLOT = "summary.json", "rollout.rrd", "rollout.mp4", "rollout.png"

@@ -29,6 +29,7 @@ LAYER_OF = {
     "bench": "agents",
     "plots": "control",
     "render": "record",
+    "film": "record",
     "shapes": "record",
 }
 # Files that only high layers may import, although they themselves see only what is low:

@@ -15,6 +15,7 @@ import pytest
 import rerun
 from rerun.chunk import RrdReader
 
+from tca_mj import film as film_module
 from tca_mj import plots, render
 from tca_mj.record import QUANTITIES, Recorder
 from tca_mj.shapes import body_paths
@@ -422,9 +423,9 @@ def test_a_picture_shows_the_temperature(simulation: Chain) -> None:
     camera = mujoco.MjvCamera()
     camera.lookat[:] = [0.0, 0.0, 0.12]
     camera.distance, camera.azimuth, camera.elevation = 0.25, 90.0, -10.0
-    cold = render.still(simulation, width=320, height=240, camera=camera)
+    cold = film_module.still(simulation, width=320, height=240, camera=camera)
     simulation.temperature = np.full(2, 180.0)
-    hot = render.still(simulation, width=320, height=240, camera=camera)
+    hot = film_module.still(simulation, width=320, height=240, camera=camera)
     assert cold.shape == (240, 320, 3)
     changed = (cold != hot).any(axis=2)
     assert 20 < changed.sum() < 0.1 * changed.size
@@ -436,7 +437,7 @@ def test_a_film_runs_at_the_speed_of_the_simulation(tmp_path: Path, simulation: 
     reader = pytest.importorskip("imageio_ffmpeg")
     simulation.reset()
     path = tmp_path / "film.mp4"
-    with render.Film(simulation, path, fps=20.0, speed=2.0, width=160, height=112) as film:
+    with film_module.Film(simulation, path, fps=20.0, speed=2.0, width=160, height=112) as film:
         for _ in range(50):
             film.frame()
             simulation.step(np.zeros(2), 0.04)
@@ -491,13 +492,13 @@ print(left.draw(data).shape)
 def test_wrong_films_are_refused(tmp_path: Path, simulation: Chain) -> None:
     pytest.importorskip("imageio_ffmpeg")
     with pytest.raises(ValueError, match="mp4"):
-        render.Video(tmp_path / "a.avi")
+        film_module.Video(tmp_path / "a.avi")
     with pytest.raises(ValueError, match="fps"):
-        render.Video(tmp_path / "a.mp4", fps=0.0)
+        film_module.Video(tmp_path / "a.mp4", fps=0.0)
     with pytest.raises(ValueError, match="multiples of 16"):
-        render.Film(simulation, tmp_path / "a.mp4", width=100)
+        film_module.Film(simulation, tmp_path / "a.mp4", width=100)
     with pytest.raises(ValueError, match="16"):
-        render.Video(tmp_path / "a.mp4").append(np.zeros((20, 32, 3), dtype=np.uint8))
+        film_module.Video(tmp_path / "a.mp4").append(np.zeros((20, 32, 3), dtype=np.uint8))
 
 
 def test_event_labels_neither_overlap_nor_stand_on_lines() -> None:

@@ -14,6 +14,18 @@ SILICONE_YOUNG = 0.125e6  # Ecoflex 00-30, Sun, Section 5.3 [Pa]
 SILICONE_SHEAR = SILICONE_YOUNG / 3.0  # incompressible, Sun, Section 5.3 [Pa]
 
 
+def silicone_cylinder(length: float, diameter: float, outer_diameter: float) -> BeamSpec:
+    """A cylinder of Ecoflex 00-30: the section that carries load, and the body that is seen [m]."""
+    return BeamSpec.circular(
+        length=length,
+        diameter=diameter,
+        outer_diameter=outer_diameter,
+        young=SILICONE_YOUNG,
+        shear=SILICONE_SHEAR,
+        density=SILICONE_DENSITY,
+    )
+
+
 @dataclass(frozen=True, kw_only=True, slots=True)
 class BendingSpec:
     """A cylinder with parallel TCAs.
@@ -53,14 +65,7 @@ class BendingSpec:
     @property
     def body(self) -> BeamSpec:
         """The soft body without its TCAs."""
-        return BeamSpec.circular(
-            length=self.length,
-            diameter=self.diameter,
-            outer_diameter=self.outer_diameter,
-            young=SILICONE_YOUNG,
-            shear=SILICONE_SHEAR,
-            density=SILICONE_DENSITY,
-        )
+        return silicone_cylinder(self.length, self.diameter, self.outer_diameter)
 
 
 def bending_module(spec: BendingSpec | None = None) -> Part:

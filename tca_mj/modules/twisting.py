@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 from tca_mj.model.chain import beam
 from tca_mj.model.part import Part, new_spec
 from tca_mj.model.tendon import route_passes, route_tca
-from tca_mj.modules.bending import SILICONE_DENSITY, SILICONE_SHEAR, SILICONE_YOUNG
+from tca_mj.modules.bending import silicone_cylinder
 from tca_mj.rod.beam import BeamSpec, require_count, require_positive
 from tca_mj.routes import Helix, Route, UTurn, leg_length
 from tca_mj.tca import CATALOGUE, TcaSpec
@@ -60,14 +60,7 @@ class TwistingSpec:
     @property
     def body(self) -> BeamSpec:
         """The soft body without its TCA."""
-        return BeamSpec.circular(
-            length=self.length,
-            diameter=self.diameter,
-            outer_diameter=self.outer_diameter,
-            young=SILICONE_YOUNG,
-            shear=SILICONE_SHEAR,
-            density=SILICONE_DENSITY,
-        )
+        return silicone_cylinder(self.length, self.diameter, self.outer_diameter)
 
     @property
     def route(self) -> Route:
