@@ -4,6 +4,9 @@ from tca_mj.tca.bank import Pull, TcaBank, TcaState
 from tca_mj.tca.centreline import CONICAL, Centreline, ConicalTca
 from tca_mj.tca.coilbvp import FibreShape, Stiffness, fibre_stiffness, solve_fibre
 from tca_mj.tca.coilrod import CoilRods, CoilSolveError, Helix, coil_tension
+from tca_mj.tca.course import solve_course
+from tca_mj.tca.creep import CreepBank, CreepSpec, CreepState
+from tca_mj.tca.dynamics import Heating, Load, LoadedTcas, LoadState, MotionSolveError
 from tca_mj.tca.moduli import FibreTable, radial_growth, softened_tension, softening, untwist
 from tca_mj.tca.sensing import WireTable, resistance, sensed_length
 from tca_mj.tca.spec import CATALOGUE, FREE_STROKE_CREPT, FibreSpec, TcaSpec
@@ -20,12 +23,20 @@ __all__ = [
     "CoilSolveError",
     "CoilSurfaces",
     "ConicalTca",
+    "CreepBank",
+    "CreepSpec",
+    "CreepState",
     "FREE_STROKE_CREPT",
     "FibreShape",
     "FibreSpec",
     "FibreTable",
     "HeatSpec",
+    "Heating",
     "Helix",
+    "Load",
+    "LoadState",
+    "LoadedTcas",
+    "MotionSolveError",
     "Pull",
     "Stiffness",
     "Surface",
@@ -47,6 +58,7 @@ __all__ = [
     "sensed_length",
     "softened_tension",
     "softening",
+    "solve_course",
     "solve_fibre",
     "step_temperature",
     "tension",

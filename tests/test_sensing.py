@@ -1,0 +1,251 @@
+"""Self-sensing: resistance curves, the polynomial that reads them, noise and pulses."""
+
+import math
+
+import numpy as np
+import pytest
+
+from tca_mj.tca import CATALOGUE, WireTable, resistance, sensed_length
+from tca_mj.tca.dynamics import Heating, Load, LoadedTcas, LoadState
+from tca_mj.tca.sensing import (
+    SensingSpec,
+    fit_displacement,
+    resistance_displacement,
+    resistance_force,
+    resistance_length,
+)
+from tca_mj.tca.sensor import CurrentSensor, measured, moving_average, pulse_mean, pulse_power
+
+# Sun, Table 2.3: natural length 110 mm, 6.7 ohm/dm.
+TCA = CATALOGUE["type-2-180"].of_length(0.110)
+WIRE = WireTable.of([TCA])
+NO_LOAD = SensingSpec(load=0.0)
+
+
+def stretched(load):
+    return LoadedTcas([TCA], Load(force=load)).settle(np.full(load.shape, 25.0))
+
+
+def test_resistance_rises_with_contraction_by_what_is_published():
+    """0.55 ohm for 50 % of 110 mm (Sun, Section 2.3.1)."""
+    ohms = resistance_displacement(WIRE, np.array([[0.0], [0.055]]), sensing=NO_LOAD)
+    assert ohms[0, 0] == pytest.approx(7.37, rel=1e-12)
+    assert ohms[1, 0] - ohms[0, 0] == pytest.approx(0.55, rel=1e-12)
+
+
+def test_without_a_load_it_is_the_law_of_the_length():
+    length = np.linspace(0.05, 0.15, 11)[:, None]
+    np.testing.assert_allclose(
+        resistance_length(WIRE, length, TCA.rest_length), resistance(WIRE, length, 25.0), rtol=1e-14
+    )
+    np.testing.assert_allclose(
+        resistance_length(WIRE, length, TCA.rest_length),
+        resistance_displacement(WIRE, TCA.rest_length - length), rtol=0.0,
+    )  # fmt: skip
+
+
+def test_curves_over_displacement_nearly_overlap_and_those_over_length_do_not():
+    """10 to 50 g: the averaged curve misleads by less than 20 % of a step of 40 mm."""
+    loads = 9.81e-3 * np.array([10.0, 20.0, 30.0, 40.0, 50.0])
+    displacement = np.linspace(0.0, 0.04, 21)[:, None]
+    curves = resistance_displacement(WIRE, displacement, loads)
+    slope = 0.55 / 0.055  # [ohm/m]
+    off = (curves - curves.mean(axis=1, keepdims=True)) / slope
+    assert np.abs(off).max() == pytest.approx(0.2 * 0.040, rel=0.05)
+    assert np.all(loads < SensingSpec().valid_share * TCA.breaking_force)
+    starts = stretched(loads[:, None])[:, 0]
+    length = 0.12
+    over_length = resistance_length(WIRE, np.full(5, length), starts, loads)
+    assert np.ptp(over_length) > 2.0 * np.ptp(curves[0])
+    assert np.all(np.diff(over_length) > 0.0)  # the heavier, the more it has contracted there
+
+
+def test_the_curve_does_not_depend_on_the_speed():
+    """The same weight lifted by 12 V and by 8 V: one resistance at one length."""
+    tcas = LoadedTcas([TCA], Load.weight(0.02, 0.05))
+    curves = []
+    for volts, dt in ((12.0, 1e-3), (8.0, 2e-3)):
+        course = tcas.simulate(tcas.rest(), Heating(source="voltage", value=volts), dt, 150)
+        state = LoadState(course.length, course.velocity, course.temperature, course.power)
+        curves.append((course.length[:, 0], tcas.resistance(state)[:, 0]))
+    (fast, fast_ohms), (slow, slow_ohms) = curves
+    order = np.argsort(fast)
+    inside = slow > fast.min()
+    assert np.ptp(slow[inside]) > 1e-3
+    there = np.interp(slow[inside], fast[order], fast_ohms[order])
+    np.testing.assert_allclose(slow_ohms[inside], there, rtol=1e-9)
+
+
+def test_a_load_on_a_cold_tca_lowers_its_resistance():
+    loads = np.linspace(0.0, 0.4, 9)[:, None]
+    ohms = resistance_force(WIRE, loads, stretched)
+    assert ohms[0, 0] == pytest.approx(7.37, rel=1e-9)
+    assert np.all(np.diff(ohms[:, 0]) < 0.0)
+    np.testing.assert_allclose(sensed_length(WIRE, ohms), stretched(loads), rtol=1e-12)
+
+
+def test_terms_of_load_and_temperature():
+    sensing = SensingSpec(load=0.1, temperature=1e-3)
+    base = resistance_displacement(WIRE, [0.02], sensing=sensing)
+    np.testing.assert_array_equal(base, resistance_displacement(WIRE, [0.02]))
+    np.testing.assert_allclose(
+        resistance_displacement(WIRE, [0.02], 0.5, sensing=sensing), base - 0.05 * 7.37
+    )
+    np.testing.assert_allclose(
+        resistance_displacement(WIRE, [0.02], 0.0, 125.0, sensing), base + 0.1 * 7.37
+    )
+
+
+def test_a_cubic_is_fitted_exactly():
+    rng = np.random.default_rng(1)
+    ohms = rng.uniform(7.0, 8.0, 50)
+    truth = np.polynomial.Polynomial([0.01, -0.2, 0.05, 0.003])
+    fit = fit_displacement(ohms, truth(ohms))
+    assert fit.rmse < 1e-13
+    points = np.array([7.1, 7.9])
+    np.testing.assert_allclose(fit.displacement(points), truth(points), atol=1e-12)
+    np.testing.assert_array_equal(fit.covers([6.9, 7.5, 8.1]), [False, True, False])
+    quintic = np.polynomial.Polynomial([0.0, 0.0, 0.0, 0.0, 0.0, 1e-6])
+    third = fit_displacement(ohms, quintic(ohms))
+    assert fit_displacement(ohms, quintic(ohms), 5).rmse < 1e-3 * third.rmse
+
+
+def test_the_error_of_the_fit_is_that_of_the_noise():
+    """RMSE = sigma_R / (dR/dD) but for the 4 coefficients: 0.22 mm reported at 20 g."""
+    rng = np.random.default_rng(2)
+    displacement = np.linspace(0.0, 0.04, 400)
+    true = resistance_displacement(WIRE, displacement[:, None], 0.02 * 9.81)[:, 0]
+    rmses = []
+    for _ in range(20):
+        fit = fit_displacement(measured(true, 12.0, rng), displacement)
+        rmses.append(fit.rmse)
+    sensor = CurrentSensor()
+    sigma_current = math.hypot(sensor.noise, sensor.resolution / math.sqrt(12.0))
+    theory = np.mean(true**2) / 12.0 * sigma_current / (0.55 / 0.055)
+    assert np.mean(rmses) == pytest.approx(theory, rel=0.05)
+    assert np.mean(rmses) == pytest.approx(0.2184e-3, rel=0.1)
+
+
+def test_a_perfect_sensor_measures_the_resistance():
+    perfect = CurrentSensor(resolution=0.0, noise=0.0)
+    ohms = np.array([3.0, 7.37])
+    rng = np.random.default_rng(0)
+    np.testing.assert_allclose(measured(ohms, 12.0, rng, perfect, duty=0.3), ohms, rtol=1e-15)
+    off = CurrentSensor(resolution=0.0, noise=0.0, gain_error=0.01)
+    np.testing.assert_allclose(measured(ohms, 12.0, rng, off), ohms / 1.01, rtol=1e-14)
+
+
+def test_the_steps_of_the_sensor():
+    """The current is a whole number of steps, at most half a step off."""
+    stepped = CurrentSensor(noise=0.0)
+    ohms = np.linspace(7.0, 8.0, 200)
+    current = 0.8 / measured(ohms, 0.8, np.random.default_rng(0), stepped)
+    steps = current / stepped.resolution
+    np.testing.assert_allclose(steps, np.round(steps), atol=1e-9)
+    assert np.abs(current - 0.8 / ohms).max() <= 0.5 * stepped.resolution * (1.0 + 1e-9)
+
+
+def test_noise_is_reproducible_unbiased_and_of_its_size():
+    sensor = CurrentSensor(resolution=0.0, noise=1e-3)
+    ohms = np.full(20_000, 7.37)
+    first = measured(ohms, 12.0, np.random.default_rng(5), sensor)
+    np.testing.assert_array_equal(first, measured(ohms, 12.0, np.random.default_rng(5), sensor))
+    sigma = 1e-3 * 7.37**2 / 12.0
+    assert first.std() == pytest.approx(sigma, rel=0.03)
+    assert abs(first.mean() - 7.37) < 4.0 * sigma / math.sqrt(20_000)
+
+
+def test_pulses_are_averaged_exactly_over_whole_periods():
+    duty = np.linspace(0.0, 1.0, 11)
+    for phase in (0.0, 0.3, -2.7):
+        np.testing.assert_allclose(pulse_mean(duty, 40.0, phase), duty, atol=1e-14)
+
+
+def test_a_cut_pulse_is_off_by_less_than_its_bound():
+    rng = np.random.default_rng(3)
+    duty, phase = rng.random(2000), rng.random(2000)
+    periods = rng.uniform(0.1, 20.0, 2000)
+    error = np.abs(pulse_mean(duty, periods, phase) - duty)
+    assert np.all(error <= duty * (1.0 - duty) / periods + 1e-14)
+    time = (np.arange(100_000) + 0.5) / 100_000 * 3.7 + 0.4
+    assert pulse_mean(0.35, 3.7, 0.4) == pytest.approx(np.mean(time % 1.0 < 0.35), abs=1e-4)
+    # A window of one and a half pulses of 0.25 ms reads a third too much current.
+    perfect = CurrentSensor(resolution=0.0, noise=0.0)
+    ohms = measured([7.37], 12.0, np.random.default_rng(0), perfect, duty=0.5, window=0.375e-3)
+    assert ohms[0] == pytest.approx(7.37 * 0.5 * 1.5, rel=1e-12)
+
+
+def test_pulsed_power_is_that_of_the_wave():
+    """duty V^2/R: the square is averaged, not the mean squared."""
+    assert pulse_power(12.0, 0.25, 7.2) == pytest.approx(5.0, rel=1e-15)
+    on = np.arange(1000) < 250
+    assert pulse_power(12.0, 0.25, 7.2) == pytest.approx(np.mean((12.0 * on) ** 2 / 7.2), rel=1e-12)
+
+
+def test_moving_average_of_a_step_and_of_noise():
+    np.testing.assert_allclose(
+        moving_average(np.ones(30), 10, start=0.0), 1.0 - 0.9 ** np.arange(1, 31), rtol=1e-13
+    )
+    np.testing.assert_array_equal(moving_average([3.0, 3.0], 5), [3.0, 3.0])
+    noise = np.random.default_rng(0).standard_normal((4000, 50))
+    late = moving_average(noise, 10)[100:]
+    assert late.std() == pytest.approx(1.0 / math.sqrt(19.0), rel=0.02)
+    np.testing.assert_allclose(moving_average(noise, 1), noise, atol=1e-14)
+
+
+def test_bad_inputs_are_refused():
+    rng = np.random.default_rng(0)
+    for bad in (math.nan, math.inf, -1.0):
+        with pytest.raises(ValueError):
+            resistance_displacement(WIRE, bad)
+        with pytest.raises(ValueError, match="load"):
+            resistance_displacement(WIRE, 0.01, bad)
+        with pytest.raises(ValueError, match="length"):
+            resistance_length(WIRE, bad, 0.11)
+        with pytest.raises(ValueError, match="start"):
+            resistance_length(WIRE, 0.11, bad)
+        with pytest.raises(ValueError, match="load"):
+            resistance_force(WIRE, bad, stretched)
+        with pytest.raises(ValueError, match="resistance"):
+            measured([bad], 12.0, rng)
+        with pytest.raises(ValueError, match="voltage"):
+            measured([7.0], bad, rng)
+        with pytest.raises(ValueError, match="duty"):
+            measured([7.0], 12.0, rng, duty=bad)
+        with pytest.raises(ValueError, match="window"):
+            measured([7.0], 12.0, rng, window=bad)
+        with pytest.raises(ValueError, match="duty"):
+            pulse_mean(bad, 1.0)
+        with pytest.raises(ValueError, match="periods"):
+            pulse_mean(0.5, bad)
+        with pytest.raises(ValueError, match="duty"):
+            pulse_power(1.0, bad, 1.0)
+        with pytest.raises(ValueError, match="resistance"):
+            pulse_power(1.0, 0.5, bad)
+        for name in ("load", "valid_share"):
+            with pytest.raises(ValueError, match=name):
+                SensingSpec(**{name: bad})
+        for name in ("resolution", "noise", "pulse_frequency", "gain_error"):
+            with pytest.raises(ValueError, match=name):
+                CurrentSensor(**{name: bad})
+    with pytest.raises(ValueError, match="temperature"):
+        resistance_displacement(WIRE, 0.01, temperature=math.nan)
+    with pytest.raises(ValueError, match="must be above"):
+        measured([7.37], 0.01, rng)  # 1.4 mA: less than two steps of the sensor
+    with pytest.raises(ValueError, match="voltage"):
+        pulse_power(math.nan, 0.5, 1.0)
+    with pytest.raises(ValueError, match="phase"):
+        pulse_mean(0.5, 1.0, math.inf)
+    with pytest.raises(ValueError, match="shape"):
+        fit_displacement([1.0, 2.0], [1.0])
+    with pytest.raises(ValueError, match="degree"):
+        fit_displacement([1.0, 2.0, 2.0, 3.0], [1.0, 2.0, 2.0, 3.0])
+    with pytest.raises(ValueError, match="finite"):
+        fit_displacement([1.0, math.nan, 2.0, 3.0, 4.0], [1.0, 2.0, 2.0, 3.0, 1.0])
+    with pytest.raises(ValueError, match="resistance"):
+        fit_displacement(*np.arange(10.0).reshape(2, 5)).displacement(math.nan)
+    with pytest.raises(ValueError, match="count"):
+        moving_average([1.0], 0)
+    for values in (1.0, [math.nan]):
+        with pytest.raises(ValueError, match="values"):
+            moving_average(values, 2)
