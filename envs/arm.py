@@ -11,7 +11,7 @@ from dm_control.utils import rewards
 from numpy.typing import ArrayLike, NDArray
 
 from tca_mj.assets import mjcf
-from tca_mj.envs.table import Entry, Table
+from tca_mj.envs.table import Entry, Table, numbers
 from tca_mj.model.scene import scene
 from tca_mj.render import Offscreen, colour_tendons
 from tca_mj.robots.arm import ArmSpec, arm
@@ -70,10 +70,11 @@ class ArmPickPlace(gym.Env[Observation, Action]):
     closed, with the fingers in its x-z plane and z from tips to mount, so that it is not turned
     while it hangs straight. The first number of a quaternion is not negative.
 
-    Reward, the sum of the terms in ``info["reward_terms"]``:
-        reach: Up to 0.1, the closer the gripper is to the object.
-        carry: Up to 0.4, the closer the object is to the cup's axis, once it has been carried:
-            lifted 8 mm off its stand. Pushed off its stand into the cup it earns nothing.
+    Reward, the sum of the terms in ``info["reward_terms"]``. The first two pay for progress and
+    take it back, so that nothing is earned by staying where they are high:
+        reach: Change of a measure from 0 to 1 of how close the gripper is to the object.
+        carry: Change of a measure from 0 to 4 of how close the object is to the cup's axis, 0
+            until it has been carried: lifted 8 mm off its stand.
         place: 20 in the step in which the object, having been carried, has rested in the cup for
             0.3 s, untouched by the arm.
         energy: Minus 0.002 per joule of electrical energy.
@@ -127,7 +128,7 @@ class ArmPickPlace(gym.Env[Observation, Action]):
             )
         if camera not in CAMERAS:
             raise ValueError(f"camera must be one of {CAMERAS}, got {camera!r}")
-        pixels = _numbers("size", size, (2,))
+        pixels = numbers("size", size, (2,))
         if pixels.min() < 1.0:
             raise ValueError(f"size must be at least 1 pixel each way, got {size}")
         updates = self.control_period / (5.0 * timestep) if timestep > 0.0 else 0.0
@@ -149,6 +150,7 @@ class ArmPickPlace(gym.Env[Observation, Action]):
         self.object = "screwdriver"
         self._in_cup, self._carried = 0, False
         self._find(self.model)
+        self._progress, _ = self._judge()
 
     def _find(self, model: mujoco.MjModel) -> None:
         """Looks up the addresses of what is observed and set."""
@@ -202,6 +204,7 @@ class ArmPickPlace(gym.Env[Observation, Action]):
 
         self.sim.reset(place)
         self._in_cup, self._carried = 0, False
+        self._progress, _ = self._judge()
         return self._observe(), self._info()
 
     def _setup(self, options: Mapping[str, Any]) -> dict[str, Any]:
@@ -225,7 +228,7 @@ class ArmPickPlace(gym.Env[Observation, Action]):
         if setup["object"] not in list(OBJECTS):
             raise ValueError(f"object must be one of {sorted(OBJECTS)}, got {setup['object']!r}")
         for key, shape in (("object_position", (2,)), ("cup_position", (2,)), ("object_yaw", ())):
-            setup[key] = _numbers(key, setup[key], shape)
+            setup[key] = numbers(key, setup[key], shape)
         if np.abs(setup["object_position"]).max() > reach + 1e-12:
             raise ValueError(
                 f"object_position must be within {reach} m of 0 in x and y,"
@@ -260,7 +263,7 @@ class ArmPickPlace(gym.Env[Observation, Action]):
         Raises:
             ValueError: If the action has the wrong shape, is not finite or out of [-1, 1].
         """
-        command = _numbers("action", action, (ACTION.size,))
+        command = numbers("action", action, (ACTION.size,))
         if np.abs(command).max() > 1.0 + 1e-6:
             raise ValueError(f"action must be within -1 and 1, got {command}")
         command = np.clip(command, -1.0, 1.0)
@@ -276,10 +279,12 @@ class ArmPickPlace(gym.Env[Observation, Action]):
         outside = OBSERVATION.outside(observation)
         if outside:
             reason = reason or f"diverged: {', '.join(outside)} out of bounds"
-            observation = self._bounded(observation)
-        terms, rests = self._reward(float(np.sum(power)) * self.control_period)
-        if reason is not None:  # nothing is known of a diverged state
-            terms["reach"] = terms["carry"] = 0.0
+            observation = OBSERVATION.bounded(observation)
+        before, rests = self._progress, False
+        if reason is None:  # nothing is known of a diverged state
+            self._progress, rests = self._judge()
+        terms = {name: value - before[name] for name, value in self._progress.items()}
+        terms["energy"] = -0.002 * float(np.sum(power)) * self.control_period
         reason = reason or self._damage()
         self._in_cup = self._in_cup + 1 if rests else 0
         success = self._in_cup >= 3 and reason is None
@@ -328,12 +333,6 @@ class ArmPickPlace(gym.Env[Observation, Action]):
             }
         )
 
-    def _bounded(self, observation: Observation) -> Observation:
-        """The last observation of a diverged episode, brought back into the space."""
-        space = self.observation_space
-        low, high = space.low, space.high  # type: ignore[attr-defined]
-        return np.clip(np.nan_to_num(observation), low, high).astype(np.float32)
-
     def _damage(self) -> str | None:
         """Why a TCA does not survive, or None."""
         sim = self.sim
@@ -347,8 +346,8 @@ class ArmPickPlace(gym.Env[Observation, Action]):
             return f"torn: {sim.tca_names[i]} above {sim.bank.breaking_force[i]} N"
         return None
 
-    def _reward(self, energy: float) -> tuple[dict[str, float], bool]:
-        """The terms of the reward, and whether the object lies still in the cup."""
+    def _judge(self) -> tuple[dict[str, float], bool]:
+        """How far the task has got, by reward term, and whether the object rests in the cup."""
         data = self.data
         position, cup = self._position(), data.mocap_pos[self._cup]
         dofs = self._free_v[self.object]
@@ -359,11 +358,7 @@ class ArmPickPlace(gym.Env[Observation, Action]):
         gap = math.dist(position, data.site_xpos[self._grasp])
         near = float(rewards.tolerance(gap, bounds=(0.0, 4e-3), margin=0.05))
         over = float(rewards.tolerance(aside, bounds=(0.0, 8e-3), margin=0.03))
-        return {
-            "reach": 0.1 * near,
-            "carry": 0.4 * over * self._carried,
-            "energy": -0.002 * energy,
-        }, rests
+        return {"reach": near, "carry": 4.0 * over * self._carried}, rests
 
     def _touched(self) -> bool:
         """Whether the arm touches the object."""
@@ -408,14 +403,3 @@ class ArmPickPlace(gym.Env[Observation, Action]):
         if self._screen is not None:
             self._screen.close()
             self._screen = None
-
-
-def _numbers(name: str, value: Any, shape: tuple[int, ...]) -> NDArray[np.float64]:
-    """``value`` as real, finite numbers of the given shape, or a ``ValueError`` that names it."""
-    try:
-        array = np.asarray(value)
-        if array.shape == shape and array.dtype.kind in "iuf" and np.isfinite(array).all():
-            return array.astype(np.float64)
-    except (TypeError, ValueError):
-        pass
-    raise ValueError(f"{name} must be finite numbers of shape {shape}, got {value!r}")

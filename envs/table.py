@@ -80,6 +80,10 @@ class Table:
         bad = ~good
         return [name for name, where in self.slices.items() if bad[where].any()]
 
+    def bounded(self, array: NDArray[Any]) -> NDArray[np.float32]:
+        """The array with what is out of bounds on the nearest one, and 0 for what is no number."""
+        return np.clip(np.nan_to_num(array), self._low, self._high).astype(np.float32)
+
     def markdown(self) -> str:
         """The table as Markdown, for the documentation."""
         lines = ["| index | entry | low | high | unit |", "|---|---|---|---|---|"]
@@ -91,3 +95,14 @@ class Table:
                 f"| {index} | {entry.name} | {entry.low:g} | {entry.high:g} | {entry.unit} |"
             )
         return "\n".join(lines)
+
+
+def numbers(name: str, value: Any, shape: tuple[int, ...]) -> NDArray[np.float64]:
+    """``value`` as real, finite numbers of the given shape, or a ``ValueError`` that names it."""
+    try:
+        array = np.asarray(value)
+        if array.shape == shape and array.dtype.kind in "iuf" and np.isfinite(array).all():
+            return array.astype(np.float64)
+    except (TypeError, ValueError):
+        pass
+    raise ValueError(f"{name} must be finite numbers of shape {shape}, got {value!r}")

@@ -410,3 +410,19 @@ def test_a_table_is_also_markdown():
 def test_a_table_refuses_other_rows(values, message):
     with pytest.raises(ValueError, match=message):
         TABLE.pack(values)
+
+
+def test_staying_where_it_is_good_earns_nothing(shared):
+    """Reach and carry are changes: over any course they add up to its end minus its start."""
+    shared.reset(seed=4)
+    start = dict(shared._progress)
+    action = np.array([-1.0, -1.0, -1.0, -0.8, -0.5, -1.0], dtype=np.float32)
+    earned = {"reach": 0.0, "carry": 0.0}
+    for k in range(25):
+        action[5] = -1.0 if k < 10 else 0.0
+        *_, info = shared.step(action)
+        for name in earned:
+            earned[name] += info["reward_terms"][name]
+    assert earned["reach"] > 0.1  # it went down towards the object
+    for name, total in earned.items():
+        assert total == pytest.approx(shared._progress[name] - start[name], abs=1e-12)

@@ -12,7 +12,7 @@ def test_the_object_is_held_to_the_cup_and_let_go_there(kind):
     """In the order of the published sequence, and by opening the gripper, not by losing it."""
     env, policy = ArmPickPlace(), PickAndPlace()
     observation, _ = env.reset(seed=1, options={"object": kind})
-    phases, held, hottest, info = [], {}, 0.0, {}
+    phases, held, hottest, total, info = [], {}, 0.0, 0.0, {}
     for _ in range(900):
         action = policy.act(observation)
         seen = OBSERVATION.read(observation)
@@ -21,13 +21,15 @@ def test_the_object_is_held_to_the_cup_and_let_go_there(kind):
             held[policy.phase] = np.linalg.norm(seen["object position"] - seen["gripper position"])
         if policy.phase == "release" and policy.since < 0.15:
             opening = float(seen["gripper opening"][0])
-        observation, _, terminated, truncated, info = env.step(action)
+        observation, reward, terminated, truncated, info = env.step(action)
+        total += reward
         hottest = max(hottest, float(info["temperature"].max()))
         assert info["tension"].max() < 0.78
         if terminated or truncated:
             break
     assert info["success"]
     assert policy.tries == 1
+    assert 20.0 < total < 25.0  # most of it for laying the object down
     assert phases[:8] == list(PHASES[:8])
     assert held["lift"] < 6e-3  # in the grasp when lifted, and still when released
     assert held["release"] == pytest.approx(held["turn back"], abs=2e-3)
