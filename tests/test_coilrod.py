@@ -184,6 +184,27 @@ def test_tension_rises_with_length(spec):
         assert np.all(stiffness > 0.0)
 
 
+@pytest.mark.parametrize("stiff", [5.4545, 10.0, 30.0])
+@pytest.mark.parametrize("pitch", [0.3, 0.6, 0.9, 1.1])
+def test_steep_coils_that_are_stiff_in_bending_buckle(stiff, pitch):
+    """dF/ds = W² (GJ - EI (1 - cos α*/cos³ b)): it falls where cos³ b > cos α*/(1 - 2 G/E).
+
+    That leaves out shear and stretch, which move the border by 1/100 of a coil this slender.
+    """
+    fibre = replace(FREE_STROKE.fibre, young=stiff * 0.22e9)
+    spec = replace(FREE_STROKE, fibre=fibre, pitch_angle=pitch, minimum_pitch_angle=0.02,
+                   coil_radius=10.0 * fibre.radius, resistance_strain=0.0)  # fmt: skip
+    rods = CoilRods([spec])
+    length = np.linspace(spec.minimum_length, rods.longest, 500)
+    cold = np.full_like(length, 25.0)
+    border = (math.cos(pitch) / (1.0 - 2.0 / stiff)) ** (1.0 / 3.0)
+    excess = np.cos(rods.helix(length, cold).pitch) - border
+    clear = np.abs(excess) > 0.01
+    _, slope = rods.tension(length, cold)
+    assert np.array_equal((slope < 0.0)[clear], (excess > 0.0)[clear])
+    assert clear.any() and (slope > 0.0).any()
+
+
 @pytest.mark.parametrize("spec", SPECS, ids=IDS)
 def test_tension_rises_with_temperature(spec):
     """Up to loads where the softening outweighs the untwist, far above those in use."""
@@ -248,10 +269,11 @@ def test_twice_the_length_is_half_the_stiffness():
 
 
 def test_one_call_is_the_law_element_by_element():
-    """An element that needs the bracketed search does not disturb its neighbours."""
+    """Neither a search within brackets nor touching coils disturb the neighbours."""
     spec = FREE_STROKE
-    length = np.array([0.03, 0.045, 0.97 * 0.175, 0.06])
+    length = np.array([0.02, 0.045, 0.97 * 0.175, 0.06])
     tension, stiffness = coil_tension(spec, length, 150.0)
+    assert tension[0] < -1.0
     for i in range(4):
         alone = coil_tension(spec, length[i], 150.0)
         assert (tension[i], stiffness[i]) == (alone[0], alone[1])

@@ -1,13 +1,12 @@
-"""Calibration surfaces against the rod; their cache; the bank on them."""
+"""Calibration surfaces against the rod; the bank on them."""
 
 import math
-import multiprocessing
-from dataclasses import fields, replace
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-import tca_mj.tca.surface as surface_module
+import tca_mj.tca.calibration as calibration
 from tca_mj.tca import (
     CATALOGUE,
     CalibrationError,
@@ -18,7 +17,6 @@ from tca_mj.tca import (
     TcaState,
     calibrate,
 )
-from tca_mj.tca.surface import build, cache_folder, load_or_build
 
 FREE_STROKE = CATALOGUE["free-stroke"]
 HOT_SECTION = replace(FREE_STROKE, fibre=replace(FREE_STROKE.fibre, section="hot"), ambient=20.0)
@@ -30,9 +28,9 @@ IDS = [*CATALOGUE, "free-stroke with hot section"]
 def own_cache(tmp_path, monkeypatch):
     """Every test has an empty cache folder, and memory keeps nothing between tests."""
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    surface_module._calibrated.cache_clear()
+    calibration._calibrated.cache_clear()
     yield
-    surface_module._calibrated.cache_clear()
+    calibration._calibrated.cache_clear()
 
 
 def random_points(spec, count, seed=0, hottest=180.0):
@@ -91,7 +89,9 @@ def test_no_jump_across_the_cells(spec):
     """Tension and slope are continuous over length, the tension also over temperature."""
     coils, surface = CoilSurfaces([spec]), calibrate(spec)
     p, q = surface.cells
-    knot = np.linspace(coils.shortest, coils.longest, p + 1)[1:-1, None, :]
+    ends = spec.fibre_length * surface.shortest, spec.fibre_length * surface.longest
+    knot = np.linspace(*ends, p + 1)[1:-1, None, None]
+    knot = knot[knot[:, 0, 0] > 1.001 * coils.shortest]
     temperature = np.array([0.0, 2.5, 25.0, 61.3, 180.0])[None, :, None]
     knot, temperature = np.broadcast_arrays(knot, temperature)
     tiny = 1e-12 * spec.fibre_length
@@ -130,10 +130,35 @@ def test_the_slope_is_that_of_the_surface_itself(spec):
 def test_edges_of_the_table_are_inside():
     for spec in SPECS:
         coils = CoilSurfaces([spec])
-        for length in (coils.shortest, coils.longest):
-            for temperature in (coils.coldest, coils.hottest):
-                read = coils._read(length, temperature)
-                np.testing.assert_allclose(read, coils.rods.tension(length, temperature), rtol=1e-9)
+        for temperature in (coils.coldest, coils.hottest):
+            read = coils._read(coils.longest, temperature)
+            exact = coils.rods.tension(coils.longest, temperature)
+            np.testing.assert_allclose(read, exact, rtol=1e-9)
+            read = coils._read(coils.shortest, temperature)  # inside of a cell
+            exact = coils.rods.tension(coils.shortest, temperature)
+            np.testing.assert_allclose(read, exact, rtol=1e-4)
+
+
+@pytest.mark.parametrize("spec", SPECS, ids=IDS)
+def test_a_cold_tca_at_its_natural_length_does_not_pull(spec):
+    """It is a knot of the table, also of a coil cut to another length."""
+    for tca in (spec, spec.of_length(0.7 * spec.rest_length)):
+        temperature = np.array([spec.fibre.reference_temperature])
+        tension, slope = CoilSurfaces([tca]).tension(np.array([tca.rest_length]), temperature)
+        assert abs(tension[0]) < 1e-12
+        assert slope == pytest.approx(CoilRods([tca]).rest_stiffness, rel=1e-11)
+
+
+@pytest.mark.parametrize(
+    "reference", [("reference_temperature", 31.7), ("temperature_range", (-230.0, 160.0))]
+)
+def test_any_reference_temperature_is_a_knot(reference):
+    fibre = replace(FREE_STROKE.fibre, **dict([reference]))
+    spec = replace(FREE_STROKE, fibre=fibre)
+    surface, cold = calibrate(spec), fibre.reference_temperature
+    assert surface.coldest <= 0.0 and surface.hottest == 200.0
+    tension, _ = CoilSurfaces([spec]).tension(np.array([spec.rest_length]), np.array([cold]))
+    assert abs(tension[0]) < 1e-12
 
 
 def test_coils_that_differ_in_length_or_heat_only_share_a_surface():
@@ -194,160 +219,6 @@ def test_fine_tables_for_unusual_coils():
     assert surface.bound.relative < 2e-3
 
 
-# The cache
-
-
-def only_file(folder):
-    (path,) = folder.iterdir()
-    return path
-
-
-def same(a, b):
-    """Whether two surfaces are equal bit for bit."""
-    return all(np.array_equal(getattr(a, f.name), getattr(b, f.name)) for f in fields(a))
-
-
-def refuse(*_):
-    raise AssertionError("built anew")
-
-
-def test_a_file_is_read_back_bit_for_bit(tmp_path, monkeypatch):
-    built = load_or_build(FREE_STROKE, tmp_path)
-    monkeypatch.setattr(surface_module, "build", refuse)
-    assert same(load_or_build(FREE_STROKE, tmp_path), built)
-    assert same(load_or_build(FREE_STROKE.of_length(0.2), tmp_path), built)
-
-
-def changed_coils():
-    """The free-stroke TCA with each number changed that its tension follows from."""
-    for name in ("radius", "young", "shear", "filament_young", "softening", "inserted_twist",
-                 "untwist_scale", "reference_temperature"):  # fmt: skip
-        value = getattr(FREE_STROKE.fibre, name)
-        nearest = math.nextafter(value, math.inf)
-        yield name, replace(FREE_STROKE, fibre=replace(FREE_STROKE.fibre, **{name: nearest}))
-    for name, value in (("load_softening", (0.0, 0.0, 1.0)), ("section", "hot"),
-                        ("expansion", (3.5e-6, -6.6e-5, 1.0)),
-                        ("temperature_range", (20.0, 160.0))):  # fmt: skip
-        yield name, replace(FREE_STROKE, fibre=replace(FREE_STROKE.fibre, **{name: value}))
-    for name in ("coil_radius", "pitch_angle", "minimum_pitch_angle"):
-        nearest = math.nextafter(getattr(FREE_STROKE, name), math.inf)
-        yield name, replace(FREE_STROKE, **{name: nearest})
-
-
-@pytest.mark.parametrize(("name", "spec"), list(changed_coils()))
-def test_another_spec_reads_another_file(tmp_path, name, spec):
-    inputs = surface_module._inputs(surface_module._coil_alone(spec))
-    assert inputs != surface_module._inputs(surface_module._coil_alone(FREE_STROKE))
-    assert calibrate(spec) is not calibrate(FREE_STROKE)
-    assert len(list((tmp_path / "tca-mj").iterdir())) == 2
-
-
-@pytest.mark.parametrize(
-    ("name", "value"), [("__version__", "99.0"), ("_FORMAT", 99), ("_FINER", 9)]
-)
-def test_another_version_reads_another_file(tmp_path, monkeypatch, name, value):
-    load_or_build(FREE_STROKE, tmp_path)
-    monkeypatch.setattr(surface_module, name, value)
-    load_or_build(FREE_STROKE, tmp_path)
-    assert len(list(tmp_path.iterdir())) == 2
-
-
-def test_another_source_of_the_law_reads_another_file(tmp_path, monkeypatch):
-    load_or_build(FREE_STROKE, tmp_path)
-    edited = tmp_path / "edited.py"
-    edited.write_text("# another law")
-    monkeypatch.setattr(surface_module.coilrod, "__file__", str(edited))
-    load_or_build(FREE_STROKE, tmp_path)
-    assert len(list(tmp_path.glob("*.bin"))) == 2
-
-
-def test_an_edited_law_in_use_reads_another_file(tmp_path, monkeypatch):
-    """The source may not be what runs: the rod's answers count, too."""
-    load_or_build(FREE_STROKE, tmp_path)
-    growth = surface_module.coilrod.untwist
-    monkeypatch.setattr(surface_module.coilrod, "untwist", lambda f, t: 1.001 * growth(f, t))
-    load_or_build(FREE_STROKE, tmp_path)
-    assert len(list(tmp_path.glob("*.bin"))) == 2
-
-
-def test_a_file_under_the_wrong_name_is_not_read(tmp_path):
-    """The inputs stand in the file, too."""
-    load_or_build(FREE_STROKE, tmp_path)
-    path = only_file(tmp_path)
-    content = path.read_bytes()
-    path.unlink()
-    built = load_or_build(HOT_SECTION, tmp_path)
-    only_file(tmp_path).write_bytes(content)
-    assert same(load_or_build(HOT_SECTION, tmp_path), built)
-    assert only_file(tmp_path).read_bytes() != content
-
-
-@pytest.mark.parametrize("damage", ["empty", "cut", "one bit", "text"])
-def test_a_damaged_file_is_made_again(tmp_path, damage):
-    built = load_or_build(FREE_STROKE, tmp_path)
-    path = only_file(tmp_path)
-    good = path.read_bytes()
-    flipped = bytearray(good)
-    flipped[len(good) // 2] ^= 1
-    bad = {"empty": b"", "cut": good[:-9], "one bit": bytes(flipped), "text": b"no table\n" * 99}
-    path.write_bytes(bad[damage])
-    assert same(load_or_build(FREE_STROKE, tmp_path), built)
-    assert only_file(tmp_path).read_bytes() == good
-
-
-def test_no_place_to_write_is_no_error(tmp_path, monkeypatch):
-    built = build(FREE_STROKE)
-    (tmp_path / "a file").write_text("not a folder")
-    assert same(load_or_build(FREE_STROKE, tmp_path / "a file"), built)
-    assert same(load_or_build(FREE_STROKE, None), built)
-
-    def full(*_):
-        raise OSError("disk full")
-
-    monkeypatch.setattr(surface_module.os, "replace", full)
-    assert same(load_or_build(FREE_STROKE, tmp_path / "new"), built)
-    assert list((tmp_path / "new").iterdir()) == []  # nothing half written is left
-
-
-def test_the_folder_is_the_users(tmp_path, monkeypatch):
-    assert cache_folder() == tmp_path / "tca-mj"
-    monkeypatch.setenv("XDG_CACHE_HOME", "not/absolute")
-    monkeypatch.setenv("HOME", str(tmp_path / "home"))
-    monkeypatch.setattr(surface_module.sys, "platform", "linux")
-    assert cache_folder() == tmp_path / "home" / ".cache" / "tca-mj"
-    monkeypatch.setattr(surface_module.sys, "platform", "win32")
-    monkeypatch.setenv("LOCALAPPDATA", str(tmp_path / "local"))
-    assert cache_folder() == tmp_path / "local" / "tca-mj" / "Cache"
-
-    def homeless():
-        raise RuntimeError
-
-    monkeypatch.delenv("LOCALAPPDATA")
-    monkeypatch.setattr(surface_module.Path, "home", homeless)
-    assert cache_folder() is None
-
-
-def calibrate_in(folder, barrier, results):
-    barrier.wait()
-    surfaces = [load_or_build(spec, folder) for spec in SPECS[:3] * 3]
-    results.put([surface.tension.tobytes() for surface in surfaces[:3]])
-
-
-def test_two_processes_at_once(tmp_path):
-    context = multiprocessing.get_context("spawn")
-    barrier, results = context.Barrier(2), context.Queue()
-    arguments = (tmp_path, barrier, results)
-    workers = [context.Process(target=calibrate_in, args=arguments) for _ in range(2)]
-    for worker in workers:
-        worker.start()
-    first, second = results.get(timeout=60), results.get(timeout=60)
-    for worker in workers:
-        worker.join()
-        assert worker.exitcode == 0
-    assert first == second == [build(spec).tension.tobytes() for spec in SPECS[:3]]
-    assert len(list(tmp_path.iterdir())) == 3
-
-
 # The bank
 
 
@@ -381,7 +252,7 @@ def test_a_bank_is_its_tcas_bit_for_bit_whoever_built_the_surfaces(tmp_path):
     bank = TcaBank(SPECS, law="surface")
     state, _, length = random_inputs(bank, (), seed=3)
     pull = bank.pull(state, length)
-    surface_module._calibrated.cache_clear()  # from now on they come from files
+    calibration._calibrated.cache_clear()  # from now on they come from files
     for i, spec in enumerate(SPECS):
         alone = TcaBank([spec], law="surface").pull(
             TcaState(*(a[i : i + 1] for a in (state.temperature, state.energy_in,

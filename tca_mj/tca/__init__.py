@@ -1,17 +1,20 @@
 """Physics of twisted-and-coiled actuators (TCAs): heat, tension, resistance; n at a time."""
 
 from tca_mj.tca.bank import Pull, TcaBank, TcaState
+from tca_mj.tca.calibration import calibrate
 from tca_mj.tca.centreline import CONICAL, Centreline, ConicalTca
 from tca_mj.tca.coilbvp import FibreShape, Stiffness, fibre_stiffness, solve_fibre
 from tca_mj.tca.coilrod import CoilRods, CoilSolveError, Helix, coil_tension
+from tca_mj.tca.coilsurface import CoilSurfaces
 from tca_mj.tca.course import solve_course
 from tca_mj.tca.creep import CreepBank, CreepSpec, CreepState
-from tca_mj.tca.dynamics import Heating, Load, LoadedTcas, LoadState, MotionSolveError
+from tca_mj.tca.dynamics import LoadedTcas, MotionSolveError
+from tca_mj.tca.loads import Heating, Load, LoadState
 from tca_mj.tca.moduli import FibreTable, radial_growth, softened_tension, softening, untwist
 from tca_mj.tca.sensing import WireTable, resistance, sensed_length
 from tca_mj.tca.spec import CATALOGUE, FREE_STROKE_CREPT, FibreSpec, TcaSpec
-from tca_mj.tca.statics import beyond_breaking, hanging_length, outside_fit, tension
-from tca_mj.tca.surface import CalibrationError, CoilSurfaces, Surface, SurfaceBound, calibrate
+from tca_mj.tca.statics import beyond_breaking, hanging_length, law_at, outside_fit, tension
+from tca_mj.tca.surface import CalibrationError, Surface, SurfaceBound
 from tca_mj.tca.thermal import HeatSpec, heat_lost, power_from_voltage, step_temperature
 
 __all__ = [
@@ -51,6 +54,7 @@ __all__ = [
     "fibre_stiffness",
     "hanging_length",
     "heat_lost",
+    "law_at",
     "outside_fit",
     "power_from_voltage",
     "radial_growth",

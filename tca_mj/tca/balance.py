@@ -22,7 +22,7 @@ from tca_mj.tca.laws import (
     rod_law,
     solve,
 )
-from tca_mj.tca.moduli import radial_growth, softened_tension, softening, untwist
+from tca_mj.tca.moduli import radial_growth, softened, softening, untwist
 from tca_mj.tca.spec import TcaSpec
 
 Model = Literal["rod", "love", "cst"]
@@ -183,7 +183,7 @@ class Balance(NamedTuple):
         """True force of the coils and its slope over phi."""
         growth4 = np.square(heated.growth2)
         ratio = self.torsion_ratio(heated)
-        force, left = softened_tension(self.tca.fibre, temperature, force * growth4, ratio)
+        force, left = softened(self.tca.fibre, temperature, force * growth4, ratio)
         return force, left * growth4
 
     def push(self, length: Array) -> tuple[Array, Array]:

@@ -7,10 +7,11 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from tca_mj.tca.arrays import floats
 from tca_mj.tca.coilrod import CoilRods
+from tca_mj.tca.coilsurface import CoilSurfaces
 from tca_mj.tca.sensing import WireTable, resistance
 from tca_mj.tca.spec import TcaSpec
-from tca_mj.tca.surface import CoilSurfaces
 from tca_mj.tca.thermal import HeatSpec, heat_lost, power_from_voltage, step_temperature
 
 Array = NDArray[np.float64]
@@ -189,7 +190,7 @@ class TcaBank:
         return pull.tension > self.breaking_force
 
     def _checked(self, state: TcaState, name: str, values: ArrayLike) -> Array:
-        values = np.asarray(values, dtype=np.float64)
+        values = floats(name, values)
         shape = state.temperature.shape
         if not shape or shape[-1] != self.n:
             raise ValueError(f"state has shape {shape}; it must be (..., {self.n})")

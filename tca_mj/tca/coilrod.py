@@ -21,6 +21,14 @@ load soften all four stiffnesses alike: s is found with the moduli of the refere
 and ``moduli.softened_tension`` turns that tension into the true one. Only +, -, *, / and
 square roots are used, and every element is solved by itself, so that a result depends on
 its own inputs alone, bit for bit, whatever batch it stands in.
+
+Steep coils of fibres that are stiff in bending buckle: but for shear and stretch the slope dF/ds is
+W^2 (GJ - EI (1 - cos(alpha*)/cos^3 b)), so that the tension *falls* with length where
+
+    cos^3 b > cos(alpha*) / (1 - 2 G/E).
+
+With the E/G = 5.5 of the catalogue that needs natural pitches above 0.88 rad, with E/G = 20 above
+0.45 rad; the catalogue ends at 0.39 rad. There a length has one tension, but a load many lengths.
 """
 
 from collections.abc import Sequence
@@ -30,7 +38,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tca_mj.tca.moduli import FibreTable, radial_growth, softened_tension, softening, untwist
+from tca_mj.tca.arrays import floats
+from tca_mj.tca.moduli import FibreTable, radial_growth, softened, softening, untwist
 from tca_mj.tca.spec import TcaSpec
 
 Array = NDArray[np.float64]
@@ -157,18 +166,50 @@ class CoilRods:
             CoilSolveError: If the shape is not found.
         """
         length, temperature = self._checked(length, temperature)
+        return self.finished(length, temperature, *self.unsoftened(length, temperature))
+
+    def unsoftened(self, length: Array, temperature: Array) -> tuple[Array, Array]:
+        """The smooth part of ``tension``, for tables of it; the arguments are not checked.
+
+        Args:
+            length: Length of the TCA, shape (..., n) [m].
+            temperature: Temperature, same shape [°C].
+
+        Returns:
+            Tension that the coils would have with the moduli of the reference temperature, without
+            contact [N], and its slope over the length [N/m].
+        """
         _, stiff, slope = self._solve(length, temperature)
+        return stiff, slope
+
+    def finished(
+        self, length: Array, temperature: Array, stiff: Array, slope: Array
+    ) -> tuple[Array, Array]:
+        """The rest of ``tension``: softening by heat and load, and contact; not checked.
+
+        Args:
+            length: Length of the TCA, shape (..., n) [m].
+            temperature: Temperature, same shape [°C].
+            stiff: Tension as from ``unsoftened`` [N].
+            slope: Its slope over the length [N/m].
+
+        Returns:
+            Tension and stiffness as from ``tension``.
+        """
         per_tension = self.torsion_per_tension(temperature)
-        tension, share = softened_tension(self._fibres, temperature, stiff, per_tension)
+        tension, share = softened(self._fibres, temperature, stiff, per_tension)
+        slope = share * slope
+        if not (length < self._minimum).any():
+            return tension, slope
         contact, contact_slope = self._contact(length)
-        return tension - contact, share * slope + contact_slope
+        return tension - contact, slope + contact_slope
 
     def helix(self, length: ArrayLike, temperature: ArrayLike) -> Helix:
         """Shape and loads of the coils, contact left out; arguments and errors as ``tension``."""
         length, temperature = self._checked(length, temperature)
         sin, stiff, _ = self._solve(length, temperature)
         per_tension = self.torsion_per_tension(temperature)
-        tension, _ = softened_tension(self._fibres, temperature, stiff, per_tension)
+        tension, _ = softened(self._fibres, temperature, stiff, per_tension)
         # Not F/f, which is 0/0 for a coil at rest.
         share = softening(self._fibres, temperature, per_tension * tension)
         cos = np.sqrt(1.0 - sin * sin)
@@ -187,8 +228,7 @@ class CoilRods:
         )
 
     def _checked(self, length: ArrayLike, temperature: ArrayLike) -> tuple[Array, Array]:
-        length = np.asarray(length, dtype=np.float64)
-        temperature = np.asarray(temperature, dtype=np.float64)
+        length, temperature = floats("length", length), floats("temperature", temperature)
         for name, array in (("length", length), ("temperature", temperature)):
             if array.ndim == 0 or array.shape[-1] != self.n or array.shape != length.shape:
                 raise ValueError(
@@ -273,10 +313,10 @@ def coil_tension(spec: TcaSpec, length: ArrayLike, temperature: ArrayLike) -> tu
         CoilSolveError: If the shape is not found.
     """
     length, temperature = np.broadcast_arrays(
-        np.asarray(length, dtype=np.float64), np.asarray(temperature, dtype=np.float64)
+        floats("length", length), floats("temperature", temperature)
     )
     tension, stiffness = CoilRods([spec]).tension(length[..., None], temperature[..., None])
-    return tension[..., 0], stiffness[..., 0]
+    return tension[..., 0][()], stiffness[..., 0][()]
 
 
 def _law(sin: Array, section: _Section) -> tuple[Array, Array, Array, Array]:
@@ -298,7 +338,7 @@ def _repaired(sin: Array, wrong: NDArray[np.bool_], target: Array, section: _Sec
     """Solves the elements marked ``wrong`` by Newton's method inside a shrinking bracket."""
     part = _Section(*(np.broadcast_to(field, target.shape)[wrong] for field in section))
     goal = target[wrong]
-    low, high = np.zeros_like(goal), np.ones_like(goal)
+    low, high = np.full_like(goal, -1.0), np.ones_like(goal)
     point = 0.5 * (low + high)
     residual = np.full_like(goal, np.inf)
     for _ in range(_BRACKETED_STEPS):

@@ -9,13 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solve_banded
 
-from tca_mj.tca.dynamics import (
-    Course,
-    Heating,
-    LoadedTcas,
-    LoadState,
-    step_times,
-)
+from tca_mj.tca.dynamics import LoadedTcas
+from tca_mj.tca.loads import Course, Heating, LoadState, step_times
 
 Array = NDArray[np.float64]
 
@@ -94,7 +89,7 @@ def _window(
     for _ in range(_COURSE_STEPS):
         held = LoadState(*(a[:-1] for a in (length, velocity, temperature, temperature)))
         guess = held.length + 0.5 * dt * held.velocity
-        power, _, _ = tcas._heated(held, heating, dt, guess)
+        power, _, _ = tcas.heated(held, heating, dt, guess)
         # Temperatures: T_i + (full - 1) T_(i-1) = full (T_amb + P_i/loss).
         source = full * (heat.ambient + power / loss)
         source[0] -= cooling[1, 0] * temperature[0]
@@ -105,7 +100,7 @@ def _window(
             heat.ambient + power / loss - temperature[:-1]
         )
         points = 0.5 * (length[1:] + length[:-1])
-        tension, slope = tcas._pull(points, middle, True)
+        tension, slope = tcas.pull(points, middle, True)
         slope = 0.5 * (slope + load.stiffness)
         rate = 0.5 * (velocity[1:] + velocity[:-1])
         force = load.force + load.stiffness * (load.reference - points) - tension
@@ -125,7 +120,7 @@ def _window(
         length[1:] += correction[0]
         velocity[1:] += correction[1]
         if moved <= _COURSE_ACCEPTED and warmed <= _WARMED:
-            tcas._check_domain(length[1:])
+            tcas.check_domain(length[1:])
             return Course(step_times(dt, steps), length, velocity, temperature,
                           np.concatenate([power[:1], power]))  # fmt: skip
     return None

@@ -28,6 +28,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from tca_mj.tca.arrays import floats
 from tca_mj.tca.coilrod import CoilRods
 from tca_mj.tca.spec import TcaSpec
 
@@ -136,7 +137,7 @@ class CreepBank:
         Raises:
             ValueError: If it is not.
         """
-        length = np.asarray(length, dtype=np.float64)
+        length = floats("length", length)
         if not ((length >= self._rest) & (length < self._fibre_length)).all():
             raise ValueError(
                 f"length = {length} m must be {self._rest} m or more and below "
@@ -150,7 +151,7 @@ class CreepBank:
         Raises:
             ValueError: If a tension is not finite.
         """
-        tension = np.asarray(tension, dtype=np.float64)
+        tension = floats("tension", tension)
         if not np.isfinite(tension).all():
             raise ValueError(f"tension = {tension} N must be finite")
         stretch = np.maximum(tension, 0.0) / (self._stiffness * self._fibre_length)
@@ -237,7 +238,7 @@ def relaxation_time(temperature: ArrayLike, creep: CreepSpec) -> Array:
     Raises:
         ValueError: If a temperature is not finite and above absolute zero.
     """
-    temperature = np.asarray(temperature, dtype=np.float64)
+    temperature = floats("temperature", temperature)
     kelvin = temperature + _KELVIN
     if not ((kelvin > 0.0) & (kelvin < math.inf)).all():
         raise ValueError(f"temperature = {temperature} °C must be finite and above {-_KELVIN}")

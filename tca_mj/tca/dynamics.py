@@ -20,16 +20,28 @@ rest at a constant voltage of 5 or 6 V, the two differ by less than 0.1 mm until
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from tca_mj.tca.arrays import floats
 from tca_mj.tca.coilrod import CoilRods
+from tca_mj.tca.loads import GRAVITY, Course, Heating, Load, LoadState, step_times
 from tca_mj.tca.sensing import WireTable, resistance
 from tca_mj.tca.spec import TcaSpec
 from tca_mj.tca.thermal import HeatSpec
+
+__all__ = [
+    "GRAVITY",
+    "Course",
+    "Heating",
+    "Load",
+    "LoadState",
+    "LoadedTcas",
+    "MotionSolveError",
+    "TensionLaw",
+]
 
 Array = NDArray[np.float64]
 TensionLaw = Callable[[Array, Array], tuple[Array, Array]]
@@ -37,9 +49,7 @@ TensionLaw = Callable[[Array, Array], tuple[Array, Array]]
 ResistanceLaw = Callable[[Array, Array], Array]
 """(length, temperature), each (..., n) -> resistance [ohm]."""
 Motion = Literal["dynamic", "quasistatic"]
-Source = Literal["power", "voltage", "current"]
 
-GRAVITY = 9.81  # [m/s^2]
 # A correction of Newton's method at which the next one is not made: it would be below 1e-8 m
 # even where the turns start to touch at steps of 0.05 s, and below 1e-11 m at 1 ms.
 _ACCEPTED = 1e-6
@@ -59,119 +69,6 @@ class MotionSolveError(ArithmeticError):
     def __init__(self, residual: float) -> None:
         super().__init__(f"motion not solved: a force of {residual} N is left")
         self.residual = residual
-
-
-@dataclass(frozen=True, kw_only=True, slots=True, eq=False)
-class Load:
-    """What hangs at TCAs, scalars or arrays that broadcast with (..., n).
-
-    Attributes:
-        force: Pull on the TCA at the length ``reference`` [N].
-        stiffness: Growth of the pull per contraction, not negative [N/m].
-        reference: Length of the TCA at which the pull is ``force`` [m].
-        mass: Mass that moves with the end, not negative [kg].
-        damping: Force per speed of the end, of the TCA and what it moves, not negative [N s/m].
-    """
-
-    force: float | Array
-    stiffness: float | Array = 0.0
-    reference: float | Array = 0.0
-    mass: float | Array = 0.0
-    damping: float | Array = 0.0
-
-    def __post_init__(self) -> None:
-        for name in ("force", "stiffness", "reference", "mass", "damping"):
-            _require(name, getattr(self, name))
-
-    @classmethod
-    def weight(cls, mass: float | Array, damping: float | Array = 0.0) -> "Load":
-        """A hanging mass [kg]."""
-        _require("mass", mass)
-        return cls(force=np.multiply(mass, GRAVITY), mass=mass, damping=damping)
-
-    @classmethod
-    def spring(
-        cls,
-        stiffness: float | Array,
-        pretension: float | Array,
-        reference: float | Array,
-        mass: float | Array = 0.0,
-        damping: float | Array = 0.0,
-    ) -> "Load":
-        """A linear spring between the TCA's end and a wall, Sun, Section 3.4.4, case 2.
-
-        Args:
-            stiffness: Of the spring [N/m].
-            pretension: Tension of both at the length ``reference``; there 0.05 N.
-            reference: Length of the TCA at mounting [m].
-            mass: Mass of what joins the two [kg].
-            damping: As of ``Load`` [N s/m].
-        """
-        return cls(
-            force=pretension, stiffness=stiffness, reference=reference, mass=mass, damping=damping
-        )
-
-
-@dataclass(frozen=True, kw_only=True, slots=True, eq=False)
-class Heating:
-    """What heats and cools TCAs during a step, scalars or arrays that broadcast with (..., n).
-
-    Attributes:
-        source: Which quantity is held: "power" [W], "voltage" [V] or "current" [A].
-        value: Its value; a power is not negative.
-        air: Factor on the heat transfer coefficient: 1 still air, above 1 blown air, above 0.
-    """
-
-    source: Source = "power"
-    value: float | Array = 0.0
-    air: float | Array = 1.0
-
-    def __post_init__(self) -> None:
-        if self.source not in get_args(Source):
-            raise ValueError(f"source = {self.source!r} must be one of {get_args(Source)}")
-        if not np.isfinite(self.value).all():
-            raise ValueError(f"value = {self.value} must be finite")
-        if self.source == "power":
-            _require("value (a heater cannot cool)", self.value)
-        if not np.all((np.asarray(self.air) > 0.0) & np.isfinite(self.air)):
-            raise ValueError(f"air = {self.air} must be finite and above 0")
-
-    def power(self, resistance: ArrayLike) -> Array:
-        """Joule heat in given resistances, the broadcast shape [W]."""
-        ohms = np.asarray(resistance, dtype=np.float64)
-        if self.source == "voltage":
-            return np.square(self.value) / ohms
-        if self.source == "current":
-            return np.square(self.value) * ohms
-        return self.value + 0.0 * ohms
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class LoadState:
-    """State of n loaded TCAs, each array of shape (..., n).
-
-    Attributes:
-        length: Length of the TCA [m].
-        velocity: Its rate, negative while it contracts; 0 in quasi-static motion [m/s].
-        temperature: Temperature [°C].
-        power: Mean electrical power of the step that led here, 0 before the first [W].
-    """
-
-    length: Array
-    velocity: Array
-    temperature: Array
-    power: Array
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Course:
-    """States over time: ``time`` of shape (k,), the others (k, ..., n), as in ``LoadState``."""
-
-    time: Array
-    length: Array
-    velocity: Array
-    temperature: Array
-    power: Array
 
 
 class LoadedTcas:
@@ -252,7 +149,7 @@ class LoadedTcas:
             ValueError: If no length between ``shortest`` and ``longest`` carries the load.
             MotionSolveError: If it is not found, as for a law that does not rise.
         """
-        temperature = np.asarray(temperature, dtype=np.float64)
+        temperature = floats("temperature", temperature)
         start = [spec.rest_length for spec in self.specs] if guess is None else guess
         load = self.load
         goal = load.force + load.stiffness * load.reference
@@ -260,7 +157,7 @@ class LoadedTcas:
         temperature = np.broadcast_to(temperature, shape)
         length = np.broadcast_to(np.asarray(start, dtype=np.float64), shape)
         length = self._balance(length, temperature, 0.0, goal, 1e-9, slack=False)
-        self._check_domain(length)
+        self.check_domain(length)
         return length
 
     def tension(self, state: LoadState) -> Array:
@@ -300,7 +197,7 @@ class LoadedTcas:
         if not np.all(np.asarray(load.mass) > 0.0):
             raise ValueError(f"mass = {load.mass} must be above 0 for dynamic motion")
         guess = state.length + half * state.velocity
-        power, middle, temperature = self._heated(state, heating, dt, guess)
+        power, middle, temperature = self.heated(state, heating, dt, guess)
         # With v and l at the middle of the step the rule is one equation in l,
         # inert (l - l0) - m v0/half + F(l) = load(l).
         per_half = np.asarray(load.mass) / half
@@ -310,7 +207,7 @@ class LoadedTcas:
         length = self._balance(guess, middle, inert, goal, _ACCEPTED, slack=True)
         velocity = (length - state.length) / half
         end = 2.0 * length - state.length
-        self._check_domain(end)
+        self.check_domain(end)
         return LoadState(end, 2.0 * velocity - state.velocity, temperature, power)
 
     def simulate(
@@ -349,13 +246,13 @@ class LoadedTcas:
         """A quasi-static step: the power is that at the equilibrium in its middle."""
         guess = state.length
         if heating.source != "power":
-            _, middle, _ = self._heated(state, heating, dt, guess)
+            _, middle, _ = self.heated(state, heating, dt, guess)
             guess = self.settle(middle, guess)
-        power, _, temperature = self._heated(state, heating, dt, guess)
+        power, _, temperature = self.heated(state, heating, dt, guess)
         length = self.settle(temperature, guess)
         return LoadState(length, np.zeros_like(length), temperature, power)
 
-    def _heated(
+    def heated(
         self, state: LoadState, heating: Heating, dt: float, length: Array
     ) -> tuple[Array, Array, Array]:
         """Power, temperature in the middle and at the end of a step; ``length`` in the middle."""
@@ -381,7 +278,7 @@ class LoadedTcas:
     def _own_resistance(self, length: Array, temperature: Array) -> Array:
         return resistance(self._wire, length, temperature)
 
-    def _pull(self, length: Array, temperature: Array, slack: bool) -> tuple[Array, Array]:
+    def pull(self, length: Array, temperature: Array, slack: bool) -> tuple[Array, Array]:
         """Tension and slope; beyond the law's domain, where trial lengths may fall, its tangent."""
         inside = np.minimum(np.maximum(length, self.shortest), self.longest)
         tension, slope = self._law(inside, temperature)
@@ -406,7 +303,7 @@ class LoadedTcas:
         done = np.zeros(np.broadcast_shapes(length.shape, np.shape(goal)), dtype=bool)
         length = np.broadcast_to(length, done.shape)
         for _ in range(_STEPS):
-            tension, slope = self._pull(length, temperature, slack)
+            tension, slope = self.pull(length, temperature, slack)
             correction = (goal - fixed * length - tension) / (fixed + slope)
             length = np.where(done, length, length + correction)
             done = done | (np.abs(correction) <= accepted)
@@ -431,7 +328,7 @@ class LoadedTcas:
         point = np.where(done, length, np.clip(length, low, high))
         excess: Array = np.zeros(done.shape)
         for _ in range(_BRACKETED_STEPS):
-            tension, slope = self._pull(point, temperature, slack)
+            tension, slope = self.pull(point, temperature, slack)
             excess = fixed * point + tension - goal
             low = np.where(excess < 0.0, point, low)
             high = np.where(excess > 0.0, point, high)
@@ -453,7 +350,8 @@ class LoadedTcas:
                 break
         raise MotionSolveError(float(np.nan_to_num(np.abs(excess), nan=np.inf).max()))
 
-    def _check_domain(self, length: Array) -> None:
+    def check_domain(self, length: Array) -> None:
+        """Raises ValueError, with what may be wrong, if a length [m] is outside the law's."""
         inside = (length >= self.shortest) & (length <= self.longest)
         if not inside.all():
             worst = tuple(int(i) for i in np.argwhere(~inside)[0])
@@ -462,12 +360,3 @@ class LoadedTcas:
                 f"{self.shortest[worst[-1]]} m and {self.longest[worst[-1]]} m: the load is too "
                 "large for this TCA, or too small, or moves too fast"
             )
-
-
-def step_times(dt: float, steps: int) -> Array:
-    return dt * np.arange(steps + 1, dtype=np.float64)
-
-
-def _require(name: str, value: float | Array) -> None:
-    if not np.all((np.asarray(value) >= 0.0) & np.isfinite(value)):
-        raise ValueError(f"{name} = {value} must be finite and not below 0")

@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from tca_mj.tca.arrays import floats
 from tca_mj.tca.spec import FibreSpec
 
 Array = NDArray[np.float64]
@@ -58,10 +59,18 @@ def radial_growth(fibre: Fibres, temperature: ArrayLike) -> Array:
 
     Returns:
         Growth, same shape [1].
+
+    Raises:
+        ValueError: If a temperature is not finite or so large that the growth is not.
     """
-    rise = np.asarray(temperature, dtype=np.float64) - fibre.reference_temperature
+    temperature = floats("temperature", temperature)
+    rise = temperature - fibre.reference_temperature
     a2, a1 = fibre.growth
-    return rise * (a1 + a2 * rise)
+    with np.errstate(over="ignore", invalid="ignore"):
+        growth = rise * (a1 + a2 * rise)
+    if not np.isfinite(growth).all():
+        raise ValueError(f"temperature = {temperature} °C must be finite, and so the growth")
+    return growth
 
 
 def untwist(fibre: Fibres, temperature: ArrayLike) -> Array:
@@ -75,9 +84,10 @@ def untwist(fibre: Fibres, temperature: ArrayLike) -> Array:
         Untwist per fibre length, negative when hot, same shape [rad/m].
 
     Raises:
-        ValueError: If the fibre would shrink to nothing (far outside the fitted range).
+        ValueError: If the fibre would shrink to nothing (far outside the fitted range), or as
+            ``radial_growth``.
     """
-    temperature = np.asarray(temperature, dtype=np.float64)
+    temperature = floats("temperature", temperature)
     growth = radial_growth(fibre, temperature)
     if not (growth > -1.0).all():
         raise ValueError(f"temperature = {temperature} °C leaves the fibre no radius")
@@ -102,14 +112,19 @@ def softening(fibre: Fibres, temperature: ArrayLike, torsion: ArrayLike = 0.0) -
         Share e, 1 at the reference temperature.
 
     Raises:
-        ValueError: If nothing is left, E_f <= 0: beyond the range of the polynomial.
+        ValueError: If nothing is left, E_f <= 0: beyond the range of the polynomial; or if a
+            number is not finite.
     """
-    temperature = np.asarray(temperature, dtype=np.float64)
+    temperature = floats("temperature", temperature)
     rise = temperature - fibre.reference_temperature
     fall = fibre.softening_rate * rise
     mu2, mu1, mu0 = fibre.load_softening
-    torsion = np.maximum(np.asarray(torsion, dtype=np.float64), 0.0)
-    left = 1.0 - fall * mu0 - np.maximum(fall, 0.0) * (torsion * (mu1 + mu2 * torsion))
+    torsion = floats("torsion", torsion)
+    if not np.isfinite(torsion).all():
+        raise ValueError(f"torsion = {torsion} rad/m must be finite")
+    torsion = np.maximum(torsion, 0.0)
+    with np.errstate(over="ignore", invalid="ignore"):
+        left = 1.0 - fall * mu0 - np.maximum(fall, 0.0) * (torsion * (mu1 + mu2 * torsion))
     _require_modulus(left, temperature)
     return left
 
@@ -137,11 +152,21 @@ def softened_tension(
         Tension F [N] and its slope dF/df [1].
 
     Raises:
-        ValueError: If the heat alone leaves no modulus.
+        ValueError: If the heat alone leaves no modulus, or a number is not finite.
     """
-    temperature = np.asarray(temperature, dtype=np.float64)
+    temperature, stiff = floats("temperature", temperature), floats("stiff", stiff)
+    per_tension = floats("torsion_per_tension", torsion_per_tension)
+    for name, array in (("stiff", stiff), ("torsion_per_tension", per_tension)):
+        if not np.isfinite(array).all():
+            raise ValueError(f"{name} = {array} must be finite")
+    return softened(fibre, temperature, stiff, per_tension)
+
+
+def softened(
+    fibre: Fibres, temperature: Array, stiff: Array, torsion_per_tension: Array | float
+) -> tuple[Array, Array]:
+    """``softened_tension`` for solvers, whose trial states may be NaN: checks the modulus only."""
     rise = temperature - fibre.reference_temperature
-    stiff = np.asarray(stiff, dtype=np.float64)
     mu2, mu1, mu0 = fibre.load_softening
     fall = fibre.softening_rate * rise
     unloaded = 1.0 - fall * mu0
@@ -155,7 +180,7 @@ def softened_tension(
 
 
 def _require_modulus(left: Array, temperature: Array) -> None:
-    if not (left > 0.0).all():
+    if not ((left > 0.0) & (left < np.inf)).all():
         raise ValueError(
             f"temperature = {temperature} °C leaves a modulus E_f/E_f0 of {np.min(left)}; "
             "it must be above 0"

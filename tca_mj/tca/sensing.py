@@ -24,6 +24,7 @@ import numpy as np
 from numpy.polynomial import Polynomial
 from numpy.typing import ArrayLike, NDArray
 
+from tca_mj.tca.arrays import floats
 from tca_mj.tca.spec import TcaSpec
 
 Array = NDArray[np.float64]
@@ -69,8 +70,8 @@ def resistance(wire: WireTable, length: ArrayLike, temperature: ArrayLike) -> Ar
         ValueError: If a length is not positive and finite or so long that no resistance would
             be left, or if a temperature is not finite.
     """
-    length = np.asarray(length, dtype=np.float64)
-    temperature = np.asarray(temperature, dtype=np.float64)
+    length = floats("length", length)
+    temperature = floats("temperature", temperature)
     if not ((length > 0.0) & (length < math.inf)).all():
         raise ValueError(f"length = {length} m must be finite and above 0")
     if not np.isfinite(temperature).all():
@@ -95,7 +96,7 @@ def sensed_length(wire: WireTable, resistance: ArrayLike) -> Array:
     Raises:
         ValueError: If a resistance is not positive and finite, or does not depend on length.
     """
-    resistance = np.asarray(resistance, dtype=np.float64)
+    resistance = floats("resistance", resistance)
     if not ((resistance > 0.0) & (resistance < math.inf)).all():
         raise ValueError(f"resistance = {resistance} ohm must be finite and above 0")
     if not (wire.strain_coefficient > 0.0).all():
@@ -161,7 +162,12 @@ def resistance_displacement(
     """
     sensing = SensingSpec() if sensing is None else sensing
     displacement, load, temperature = (
-        np.asarray(array, dtype=np.float64) for array in (displacement, load, temperature)
+        floats(name, array)
+        for name, array in (
+            ("displacement", displacement),
+            ("load", load),
+            ("temperature", temperature),
+        )
     )
     for name, array in (("displacement", displacement), ("temperature", temperature)):
         if not np.isfinite(array).all():
@@ -199,7 +205,7 @@ def resistance_length(
     Raises:
         ValueError: As there, or if a length is not above 0.
     """
-    length, start = np.asarray(length, dtype=np.float64), np.asarray(start, dtype=np.float64)
+    length, start = floats("length", length), floats("start", start)
     for name, array in (("length", length), ("start", start)):
         if not ((array > 0.0) & (array < math.inf)).all():
             raise ValueError(f"{name} = {array} m must be finite and above 0")
@@ -222,7 +228,7 @@ def resistance_force(
     Raises:
         ValueError: If a load is negative or not finite, or as ``resistance``.
     """
-    load = np.asarray(load, dtype=np.float64)
+    load = floats("load", load)
     if not ((load >= 0.0) & (load < math.inf)).all():
         raise ValueError(f"load = {load} N must be finite and not below 0")
     return resistance(wire, stretched(load), 25.0)
@@ -250,14 +256,14 @@ class DisplacementFit:
         Raises:
             ValueError: If a resistance is not finite.
         """
-        resistance = np.asarray(resistance, dtype=np.float64)
+        resistance = floats("resistance", resistance)
         if not np.isfinite(resistance).all():
             raise ValueError(f"resistance = {resistance} ohm must be finite")
         return np.asarray(self.polynomial(resistance))
 
     def covers(self, resistance: ArrayLike) -> NDArray[np.bool_]:
         """Whether a resistance [ohm] lies between those that were fitted, same shape."""
-        resistance = np.asarray(resistance, dtype=np.float64)
+        resistance = floats("resistance", resistance)
         return (resistance >= self.lowest) & (resistance <= self.highest)
 
 
@@ -278,8 +284,8 @@ def fit_displacement(
         ValueError: If shapes differ, a number is not finite, or there are not more different
             resistances than ``degree``.
     """
-    resistance = np.asarray(resistance, dtype=np.float64)
-    displacement = np.asarray(displacement, dtype=np.float64)
+    resistance = floats("resistance", resistance)
+    displacement = floats("displacement", displacement)
     if resistance.ndim != 1 or resistance.shape != displacement.shape:
         raise ValueError(
             f"resistance has shape {resistance.shape}, displacement {displacement.shape}; both "

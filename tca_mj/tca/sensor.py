@@ -6,6 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from tca_mj.tca.arrays import floats
+
 Array = NDArray[np.float64]
 
 
@@ -69,7 +71,8 @@ def measured(
     """
     sensor = CurrentSensor() if sensor is None else sensor
     resistance, voltage, duty = (
-        np.asarray(array, dtype=np.float64) for array in (resistance, voltage, duty)
+        floats(name, array)
+        for name, array in (("resistance", resistance), ("voltage", voltage), ("duty", duty))
     )
     for name, array in (("resistance", resistance), ("voltage", voltage)):
         if not ((array > 0.0) & (array < math.inf)).all():
@@ -110,7 +113,8 @@ def pulse_mean(duty: ArrayLike, periods: ArrayLike, phase: ArrayLike = 0.0) -> A
         ValueError: If an argument is out of range or not finite.
     """
     duty, periods, phase = (
-        np.asarray(array, dtype=np.float64) for array in (duty, periods, phase)
+        floats(name, array)
+        for name, array in (("duty", duty), ("periods", periods), ("phase", phase))
     )
     if not ((duty >= 0.0) & (duty <= 1.0)).all():
         raise ValueError(f"duty = {duty} must lie between 0 and 1")
@@ -133,7 +137,8 @@ def pulse_power(voltage: ArrayLike, duty: ArrayLike, resistance: ArrayLike) -> A
         ValueError: If ``duty`` is not 0 to 1, a voltage is not finite, or a resistance not above 0.
     """
     voltage, duty, resistance = (
-        np.asarray(array, dtype=np.float64) for array in (voltage, duty, resistance)
+        floats(name, array)
+        for name, array in (("voltage", voltage), ("duty", duty), ("resistance", resistance))
     )
     if not ((duty >= 0.0) & (duty <= 1.0)).all():
         raise ValueError(f"duty = {duty} must lie between 0 and 1")
@@ -161,13 +166,13 @@ def moving_average(values: ArrayLike, count: int, start: ArrayLike | None = None
     Raises:
         ValueError: If ``count`` is below 1, there is no axis, or a sample is not finite.
     """
-    values = np.asarray(values, dtype=np.float64)
+    values = floats("values", values)
     if count < 1:
         raise ValueError(f"count = {count} must be 1 or more")
     if values.ndim == 0 or not np.isfinite(values).all():
         raise ValueError(f"values = {values} must be finite and have an axis of samples")
     averages = np.empty_like(values)
-    average = values[:1].sum(axis=0) if start is None else np.asarray(start, dtype=np.float64)
+    average = values[:1].sum(axis=0) if start is None else floats("start", start)
     for i, value in enumerate(values):
         average = average + (value - average) / count
         averages[i] = average

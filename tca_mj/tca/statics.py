@@ -24,11 +24,13 @@ Loads above ``breaking_force`` and temperatures outside ``fibre.temperature_rang
 (the laws extrapolate); ``beyond_breaking`` and ``outside_fit`` tell which they are.
 """
 
+from collections.abc import Callable
 from typing import get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from tca_mj.tca.arrays import floats
 from tca_mj.tca.balance import Balance, Model
 from tca_mj.tca.castigliano import Scheme
 from tca_mj.tca.laws import Array, Spin
@@ -125,9 +127,63 @@ def tension(
     return force.reshape(length.shape)[()], stiffness.reshape(length.shape)[()]
 
 
+def law_at(
+    tca: TcaSpec,
+    temperature: float,
+    *,
+    spin: Spin = "locked",
+    model: Model = "rod",
+    scheme: Scheme = "implicit",
+) -> Callable[[ArrayLike], tuple[Array, Array]]:
+    """What a body feels of a TCA that is kept at a temperature: max(0, F) over the length.
+
+    Args:
+        tca: The TCA.
+        temperature: Its temperature [°C].
+        spin: As in ``tension``.
+        model: As in ``tension``.
+        scheme: As in ``hanging_length``.
+
+    Returns:
+        A function of the length [m], of any shape, that gives the tension [N], never negative,
+        and its slope [N/m], both of that shape. Slack, also where the coils would push each
+        other, both are 0. It raises ValueError for a length that is not between 0 and 98 % of the
+        fibre's, and CoilSolveError as ``tension``.
+
+    Raises:
+        ValueError: As ``tension``, or if coils that are pressed to half of the minimum length
+            still pull.
+    """
+    problem = _checked_model(tca, model, spin, scheme)
+    hot = floats("temperature", temperature)
+    if hot.ndim:
+        raise ValueError(f"temperature has shape {hot.shape}; it must be one number")
+    _check_temperature(tca, hot)
+    pressed, _ = tension(tca, problem.shortest, hot, model=model, spin=spin, scheme=scheme)
+    if pressed > 0.0:
+        raise ValueError(
+            f"at {temperature} °C the coils pull with {pressed} N at half of their minimum length; "
+            f"contact_ratio = {tca.contact_ratio} must be larger"
+        )
+
+    def law(length: ArrayLike) -> tuple[Array, Array]:
+        length = floats("length", length)
+        _check("length", length, "m", 0.0, problem.longest)
+        inside = np.maximum(length.ravel(), problem.shortest)
+        force, slope = problem.pull(inside, np.broadcast_to(hot, inside.shape))
+        taut = (force > 0.0).reshape(length.shape)
+        force, slope = force.reshape(length.shape), slope.reshape(length.shape)
+        return np.where(taut, force, 0.0)[()], np.where(taut, slope, 0.0)[()]
+
+    return law
+
+
 def beyond_breaking(tca: TcaSpec, load: ArrayLike) -> NDArray[np.bool_]:
-    """Whether a load [N] is above ``tca.breaking_force``, same shape; nothing is clipped."""
-    return np.asarray(load, dtype=np.float64) > tca.breaking_force
+    """Whether a load [N] is above ``tca.breaking_force``, same shape; nothing is clipped.
+
+    What is not a number counts as above.
+    """
+    return ~(floats("load", load) <= tca.breaking_force)
 
 
 def outside_fit(tca: TcaSpec, temperature: ArrayLike) -> NDArray[np.bool_]:
@@ -136,7 +192,7 @@ def outside_fit(tca: TcaSpec, temperature: ArrayLike) -> NDArray[np.bool_]:
     The laws of untwist and softening were measured inside that range and extrapolate outside.
     """
     low, high = tca.fibre.temperature_range
-    temperature = np.asarray(temperature, dtype=np.float64)
+    temperature = floats("temperature", temperature)
     return ~((temperature >= low) & (temperature <= high))
 
 
@@ -150,7 +206,7 @@ def _checked_model(tca: TcaSpec, model: Model, spin: Spin, scheme: Scheme) -> Ba
 
 def _broadcast(**arrays: ArrayLike) -> tuple[Array, Array]:
     (name1, first), (name2, second) = (
-        (name, np.asarray(array, dtype=np.float64)) for name, array in arrays.items()
+        (name, floats(name, array)) for name, array in arrays.items()
     )
     try:
         first, second = np.broadcast_arrays(first, second)

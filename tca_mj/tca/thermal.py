@@ -6,6 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from tca_mj.tca.arrays import floats
+
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class HeatSpec:
@@ -23,8 +25,8 @@ class HeatSpec:
 
     def __post_init__(self) -> None:
         for name, low in (("capacity", 0.0), ("loss", 0.0), ("ambient", -273.15)):
-            value = getattr(self, name)
-            if not np.all((np.asarray(value) > low) & np.isfinite(value)):
+            value = floats(name, getattr(self, name))
+            if not np.all((value > low) & np.isfinite(value)):
                 raise ValueError(f"{name} = {value} must be finite and above {low}")
 
     @property
@@ -100,20 +102,24 @@ def power_from_voltage(voltage: ArrayLike, resistance: ArrayLike) -> NDArray[np.
     Raises:
         ValueError: If a voltage is not finite or a resistance not positive and finite.
     """
-    voltage = np.asarray(voltage, dtype=np.float64)
-    resistance = np.asarray(resistance, dtype=np.float64)
+    voltage = floats("voltage", voltage)
+    resistance = floats("resistance", resistance)
     if not np.isfinite(voltage).all():
         raise ValueError(f"voltage = {voltage} must be finite")
     if not ((resistance > 0.0) & (resistance < math.inf)).all():
         raise ValueError(f"resistance = {resistance} must be finite and above 0")
-    return voltage * voltage / resistance
+    with np.errstate(over="ignore"):
+        power = voltage * voltage / resistance
+    if not np.isfinite(power).all():
+        raise ValueError(f"voltage = {voltage} V and resistance = {resistance} ohm give no power")
+    return power
 
 
 def _checked(
     temperature: ArrayLike, power: ArrayLike, dt: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    temperature = np.asarray(temperature, dtype=np.float64)
-    power = np.asarray(power, dtype=np.float64)
+    temperature = floats("temperature", temperature)
+    power = floats("power", power)
     if not np.isfinite(temperature).all():
         raise ValueError(f"temperature = {temperature} must be finite")
     if not ((power >= 0.0) & (power < math.inf)).all():
