@@ -1,0 +1,29 @@
+"""Controllers: what turns an error into a voltage or a power, n actuators at a time."""
+
+from tca_mj.control.gait import Gait, Thermostat
+from tca_mj.control.morph import (
+    ClosedLoop,
+    Command,
+    Measurement,
+    MorphSequence,
+    MorphState,
+    OpenLoop,
+    Phase,
+)
+from tca_mj.control.pi import PiSpec, PiState, pi_rest, pi_step
+
+__all__ = [
+    "ClosedLoop",
+    "Command",
+    "Gait",
+    "Measurement",
+    "MorphSequence",
+    "MorphState",
+    "OpenLoop",
+    "Phase",
+    "PiSpec",
+    "PiState",
+    "Thermostat",
+    "pi_rest",
+    "pi_step",
+]

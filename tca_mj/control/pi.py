@@ -1,0 +1,104 @@
+"""PI control with a limited output, without wind-up, with gains that change near the goal.
+
+    output = K_P e + I      dI/dt = K_I e      lowest <= output <= highest
+
+A heater has limits on both sides: it cannot cool, and its supply ends. While the output is at a
+limit the integral grows only in the direction that leads away from it. Sun, dissertation, Colorado
+State University, Section 4.2.2, starts with a large K_P and lowers it for good once the error is
+small: ``near``. At that moment the integral takes over what K_P e loses, so that the output
+does not jump.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class PiSpec:
+    """Gains and limits, scalars or arrays that broadcast with the errors (..., n).
+
+    Attributes:
+        proportional: K_P, output per error, not negative.
+        integral: K_I, output per error and second, not negative.
+        lowest: Lower limit of the output.
+        highest: Upper limit, above the lower one.
+        near: Size of the error from which on ``near_proportional`` holds, for good; 0 is never.
+        near_proportional: K_P from then on, not negative.
+        near_integral: K_I from then on; None is the same as before.
+    """
+
+    proportional: float | Array
+    integral: float | Array = 0.0
+    lowest: float | Array = 0.0
+    highest: float | Array = math.inf
+    near: float | Array = 0.0
+    near_proportional: float | Array = 0.0
+    near_integral: float | Array | None = None
+
+    def __post_init__(self) -> None:
+        for name in ("proportional", "integral", "near", "near_proportional", "near_integral"):
+            value = getattr(self, name)
+            if value is not None and not np.all((np.asarray(value) >= 0.0) & np.isfinite(value)):
+                raise ValueError(f"{name} = {value} must be finite and not below 0")
+        if not np.isfinite(self.lowest).all():
+            raise ValueError(f"lowest = {self.lowest} must be finite")
+        if not np.all(np.asarray(self.lowest) < self.highest):
+            raise ValueError(f"highest = {self.highest} must be above lowest = {self.lowest}")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PiState:
+    """State of n controllers, each array of shape (..., n).
+
+    Attributes:
+        integral: Integral part of the output.
+        arrived: Whether the error has been as small as ``near`` once.
+    """
+
+    integral: Array
+    arrived: NDArray[np.bool_]
+
+
+def pi_rest(shape: tuple[int, ...] = ()) -> PiState:
+    """State before the first step."""
+    return PiState(np.zeros(shape), np.zeros(shape, dtype=bool))
+
+
+def pi_step(spec: PiSpec, state: PiState, error: ArrayLike, dt: float) -> tuple[PiState, Array]:
+    """One step of the controller.
+
+    Args:
+        spec: Gains and limits.
+        state: State before the step, shape (..., n).
+        error: Goal minus measurement, a shape that broadcasts with it.
+        dt: Time since the last step, above 0 [s].
+
+    Returns:
+        State after the step, and the output, each of the broadcast shape.
+
+    Raises:
+        ValueError: If an error is not finite, or ``dt`` not above 0 and finite.
+    """
+    error = np.asarray(error, dtype=np.float64)
+    if not np.isfinite(error).all():
+        raise ValueError(f"error = {error} must be finite")
+    if not 0.0 < dt < math.inf:
+        raise ValueError(f"dt = {dt} must be finite and above 0")
+    arrives = ~state.arrived & (np.abs(error) <= spec.near) & (np.asarray(spec.near) > 0.0)
+    arrived = state.arrived | arrives
+    proportional = np.where(arrived, spec.near_proportional, spec.proportional)
+    late = spec.integral if spec.near_integral is None else spec.near_integral
+    rate = np.where(arrived, late, spec.integral) * error
+    handed_over = (np.asarray(spec.proportional) - spec.near_proportional) * error
+    integral = state.integral + np.where(arrives, handed_over, 0.0)
+    wanted = proportional * error + integral + rate * dt
+    # At a limit the integral may only go back.
+    stuck = ((wanted > spec.highest) & (rate > 0.0)) | ((wanted < spec.lowest) & (rate < 0.0))
+    integral = np.where(stuck, integral, integral + rate * dt)
+    output = np.clip(proportional * error + integral, spec.lowest, spec.highest)
+    return PiState(integral, arrived), output
