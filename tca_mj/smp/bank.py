@@ -1,0 +1,108 @@
+"""Several spines advanced together, with all joints that they stiffen."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from tca_mj.smp.fixing import SpineState, Spring, advance, spring
+from tca_mj.smp.heater import HeaterSpec, HeaterState, heat_spine
+from tca_mj.smp.material import SmpSpec, SpineSpec
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SpinesState:
+    """State of n spines and of their m joints.
+
+    Attributes:
+        heat: Temperatures and energies, arrays of shape (..., n).
+        memory: Shape memory of the joints, arrays of shape (..., m).
+    """
+
+    heat: HeaterState
+    memory: SpineState
+
+
+class SpineBank:
+    """n spines of one material; joint j belongs to the spine ``owner[j]``.
+
+    Attributes:
+        smp: The material.
+        heater: Heaters, fields of shape (n,).
+        owner: Index of each joint's spine, shape (m,).
+    """
+
+    def __init__(
+        self, specs: Sequence[SpineSpec], heaters: Sequence[HeaterSpec], owner: ArrayLike
+    ) -> None:
+        """Combines the spines.
+
+        Raises:
+            ValueError: If there is no spine, the numbers differ, the materials differ, or an
+                owner does not exist.
+        """
+        if not specs or len(specs) != len(heaters):
+            raise ValueError(
+                f"specs and heaters must be as many, at least 1, got {len(specs)}, {len(heaters)}"
+            )
+        if any(spec.smp != specs[0].smp for spec in specs):
+            raise ValueError("specs must all be of one material smp")
+        self.owner = np.asarray(owner, dtype=np.int64)
+        if self.owner.ndim != 1 or not ((self.owner >= 0) & (self.owner < len(specs))).all():
+            raise ValueError(f"owner must be indices below {len(specs)}, got {owner}")
+        self.smp: SmpSpec = specs[0].smp
+        self.heater = HeaterSpec(
+            **{
+                field: np.array([getattr(heater, field) for heater in heaters])
+                for field in ("capacity", "loss", "fan_gain", "resistance", "ambient")
+            }
+        )
+
+    @property
+    def n(self) -> int:
+        """Number of spines."""
+        return len(np.asarray(self.heater.capacity))
+
+    def rest(self, memory: ArrayLike, shape: ArrayLike | None = None) -> SpinesState:
+        """Cold spines without stress.
+
+        Args:
+            memory: Memorised angles, shape (..., m) [rad].
+            shape: Angles in which they were fixed, the same shape; by default the memorised ones.
+                Between the two only the rubber pulls, as after an ideal fixing [rad].
+        """
+        memory = np.asarray(memory, dtype=np.float64)
+        heat = HeaterState.rest(self.heater, (*memory.shape[:-1], self.n))
+        state = SpineState.rest(self.smp, memory, heat.temperature[..., self.owner])
+        if shape is not None:
+            # The glass is strained so far that it holds the rubber in the shape.
+            shape = np.asarray(shape, dtype=np.float64)
+            frozen = shape + self.smp.rubbery / state.glass * (shape - memory)
+            state = SpineState(state.memory, frozen, state.glass)
+        return SpinesState(heat, state)
+
+    def advance(
+        self, state: SpinesState, voltage: ArrayLike, fan: ArrayLike, angle: ArrayLike, dt: float
+    ) -> SpinesState:
+        """Heats the spines for ``dt``, then lets glass form or melt at the present angles.
+
+        Args:
+            state: State at the start.
+            voltage: Voltages of the heaters, shape (..., n) [V].
+            fan: Whether air is blown at the spines, shape (..., n).
+            angle: Angles of the joints, shape (..., m) [rad].
+            dt: Length of the step [s].
+
+        Raises:
+            ValueError: If an input is not finite.
+        """
+        heat = heat_spine(self.heater, state.heat, voltage, fan, dt)
+        memory = advance(self.smp, state.memory, angle, heat.temperature[..., self.owner])
+        return SpinesState(heat, memory)
+
+    def spring(self, state: SpinesState) -> Spring:
+        """Modulus [Pa] and reference [rad] of each joint, shape (..., m)."""
+        return spring(self.smp, state.memory)

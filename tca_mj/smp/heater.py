@@ -1,0 +1,216 @@
+"""Heater wire, still air and fan: the temperature of a shape-memory spine.
+
+One temperature, as for a TCA: C dT/dt = V²/R - λ (T - T_amb), solved exactly. Sun, dissertation,
+Colorado State University, Section 6.1.3: 25 V heats, 9.5 V holds; from there the spine cools to
+80 °C in 25 s, and in 12 s in the air of a fan of 1 m/s.
+
+What is fitted: the time constant in still air, C/λ, to the 25 s; R to 9.5 V holding the
+temperature at which that cooling starts, which is an estimate. What follows: the fan's 12 s, by
+the speed of its air, and the time to heat at 25 V, which needs neither C nor R.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from tca_mj.rod.beam import require_positive
+from tca_mj.smp.convection import Slab, moving_air, radiation, still_air
+from tca_mj.smp.material import SpineSpec
+from tca_mj.tca import HeatSpec, heat_lost, power_from_voltage, step_temperature
+
+Array = NDArray[np.float64]
+
+HEAT_VOLTAGE = 25.0  # Sun, Section 6.1.3 [V]
+HOLD_VOLTAGE = 9.5  # Sun, Section 6.1.3 [V]
+COOL_TO = 80.0  # temperature at which both cooling times end, Sun, Section 6.1.3 [°C]
+COOL_TIME = 25.0  # time to cool in still air, Sun, Section 6.1.3; fitted [s]
+FAN_COOL_TIME = 12.0  # the same with the fan, Sun, Section 6.1.3; a check [s]
+FAN_SPEED = 1.0  # speed of the fan's air, Sun, Section 6.1.3 [m/s]
+# Temperature that 9.5 V holds, printed in a figure only [°C]. Estimate: 10 K into the soft range.
+HOLD_TEMPERATURE = 120.0
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class HeaterSpec:
+    """Thermal and electrical constants of one spine, or of n spines as arrays of shape (n,).
+
+    Attributes:
+        capacity: Heat capacity C [J/K].
+        loss: Heat lost to still air per excess temperature, λ [W/K].
+        fan_gain: Factor of the loss while the fan blows, at least 1 [1].
+        resistance: Resistance R of the heater wire [ohm].
+        ambient: Temperature of the surroundings [°C].
+
+    Raises:
+        ValueError: If a number is out of range.
+    """
+
+    capacity: float | Array
+    loss: float | Array
+    fan_gain: float | Array
+    resistance: float | Array
+    ambient: float | Array = 25.0
+
+    def __post_init__(self) -> None:
+        HeatSpec(capacity=self.capacity, loss=self.loss, ambient=self.ambient)
+        for name, low in (("fan_gain", 1.0), ("resistance", 0.0)):
+            value = np.asarray(getattr(self, name))
+            if not (np.isfinite(value) & (value >= low) & (value > 0.0)).all():
+                bound = "at least 1" if low else "above 0"
+                raise ValueError(f"{name} = {value} must be finite and {bound}")
+
+    @classmethod
+    def fitted(
+        cls,
+        spine: SpineSpec,
+        *,
+        hold_temperature: float = HOLD_TEMPERATURE,
+        hold_voltage: float = HOLD_VOLTAGE,
+        cool_time: float = COOL_TIME,
+        fan_speed: float = FAN_SPEED,
+        ambient: float = 25.0,
+    ) -> "HeaterSpec":
+        """Constants from the natural cooling alone.
+
+        The capacity, the polymer's own, scales powers and energies and no time.
+
+        Args:
+            spine: The spine, for its capacity and the fan's air round it.
+            hold_temperature: Temperature at which cooling starts, above 80 °C [°C].
+            hold_voltage: Voltage that holds it [V].
+            cool_time: Time from there to 80 °C in still air [s].
+            fan_speed: Speed of the fan's air [m/s].
+            ambient: Temperature of the room [°C].
+
+        Raises:
+            ValueError: If a number is out of range.
+        """
+        require_positive(hold_voltage=hold_voltage, cool_time=cool_time, fan_speed=fan_speed)
+        if not ambient < COOL_TO < hold_temperature:
+            raise ValueError(
+                f"hold_temperature = {hold_temperature} must be above {COOL_TO} °C and that above"
+                f" ambient = {ambient}"
+            )
+        excess = hold_temperature - ambient
+        loss = spine.heat_capacity * math.log(excess / (COOL_TO - ambient)) / cool_time
+        return cls(
+            capacity=spine.heat_capacity,
+            loss=loss,
+            fan_gain=fan_gain(spine, fan_speed, hold_temperature, ambient),
+            resistance=hold_voltage**2 / (loss * excess),
+            ambient=ambient,
+        )
+
+    def heat(self, fan: ArrayLike = False) -> HeatSpec:
+        """The heat balance with the fan on or off, shape (..., n)."""
+        loss = np.where(np.asarray(fan, dtype=bool), self.loss * self.fan_gain, self.loss)
+        return HeatSpec(capacity=self.capacity, loss=loss, ambient=self.ambient)
+
+    def power(self, voltage: ArrayLike) -> Array:
+        """Power V²/R of the heater, shape (..., n) [W]."""
+        return power_from_voltage(voltage, self.resistance)
+
+    def settled(self, voltage: ArrayLike, fan: ArrayLike = False) -> Array:
+        """Temperature that a voltage holds in the long run, shape (..., n) [°C]."""
+        return self.ambient + self.power(voltage) / self.heat(fan).loss
+
+    def time_to(
+        self, target: ArrayLike, start: ArrayLike, voltage: ArrayLike = 0.0, fan: ArrayLike = False
+    ) -> Array:
+        """Time from one temperature to another at a constant voltage; inf if never [s].
+
+        Args:
+            target: Temperature to reach, shape (..., n) [°C].
+            start: Temperature at the start, same shape [°C].
+            voltage: Voltage of the heater, same shape [V].
+            fan: Whether the fan blows, same shape.
+        """
+        settled, tau = self.settled(voltage, fan), np.asarray(self.heat(fan).time_constant)
+        now = np.asarray(start, dtype=np.float64) - settled
+        now, then = np.broadcast_arrays(now, np.asarray(target, dtype=np.float64) - settled)
+        # From here the spine goes straight towards what the voltage holds, and never past it.
+        ratio = np.divide(now, then, out=np.where(now == 0.0, 1.0, 0.0), where=then != 0.0)
+        return np.where(ratio >= 1.0, tau * np.log(np.maximum(ratio, 1.0)), np.inf)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class HeaterState:
+    """State of n spines, each array of shape (..., n).
+
+    Attributes:
+        temperature: Temperature [°C].
+        energy_in: Electrical energy taken in since the state of rest [J].
+        energy_lost: Heat given to the air since then [J].
+    """
+
+    temperature: Array
+    energy_in: Array
+    energy_lost: Array
+
+    @classmethod
+    def rest(cls, spec: HeaterSpec, shape: tuple[int, ...] = ()) -> "HeaterState":
+        """At the temperature of the surroundings, no energy counted."""
+        temperature = np.broadcast_to(np.asarray(spec.ambient, dtype=np.float64), shape).copy()
+        return cls(temperature, np.zeros(shape), np.zeros(shape))
+
+
+def heat_spine(
+    spec: HeaterSpec, state: HeaterState, voltage: ArrayLike, fan: ArrayLike, dt: float
+) -> HeaterState:
+    """Advances n spines by ``dt`` at constant voltage, exactly: any ``dt`` is stable.
+
+    Args:
+        spec: Constants, scalars or of shape (n,).
+        state: State at the start, shape (..., n).
+        voltage: Voltage of the heaters, shape (..., n) [V].
+        fan: Whether the fan blows, shape (..., n).
+        dt: Length of the step, not negative [s].
+
+    Raises:
+        ValueError: If a voltage is not finite, or ``dt`` negative.
+    """
+    power, heat = spec.power(voltage), spec.heat(fan)
+    return HeaterState(
+        temperature=step_temperature(state.temperature, power, heat, dt),
+        energy_in=state.energy_in + power * dt,
+        energy_lost=state.energy_lost + heat_lost(state.temperature, power, heat, dt),
+    )
+
+
+def fan_gain(spine: SpineSpec, speed: float, start: float, ambient: float) -> float:
+    """How many times sooner the fan cools the spine from ``start`` to 80 °C.
+
+    Air across a cylinder with the module's perimeter, still or at ``speed``, with radiation; all
+    taken at the logarithmic mean of the spine's temperatures. Epoxy conducts badly (Bi about 0.3
+    with the fan), so the times are those of the centre of a plate, where the thermistor is
+    embedded; counting the air alone, the fan would be 1.10 times as good.
+
+    Args:
+        spine: The spine; its centre is ``thickness``/2 from its faces.
+        speed: Speed of the air [m/s].
+        start: Temperature at the start [°C].
+        ambient: Temperature of the room [°C].
+
+    Returns:
+        Ratio of the two times, at least 1 [1].
+    """
+    ratio = (start - ambient) / (COOL_TO - ambient)
+    surface = ambient + (start - COOL_TO) / math.log(ratio)
+    diameter = spine.equivalent_diameter
+    natural = still_air(diameter, surface, ambient)
+    # A breeze weaker than the buoyancy changes nothing.
+    forced = max(natural, moving_air(diameter, speed, surface, ambient))
+    radiated = radiation(surface, ambient)
+
+    def time(convection: float) -> float:
+        slab = Slab(
+            thickness=spine.thickness,
+            conductivity=spine.smp.conductivity,
+            capacity=spine.smp.density * spine.smp.specific_heat,
+            coefficient=convection + radiated,
+        )
+        return slab.centre_time(ratio)
+
+    return time(natural) / time(forced)

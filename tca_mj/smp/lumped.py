@@ -1,0 +1,164 @@
+"""The bending morphing module with one angle: constant curvature, no inertia, no weight.
+
+The simplest thing that softens, bends, hardens and recovers. It answers in microseconds what a
+chain of links must agree with, and serves the tests and figures of sequences.
+"""
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tca_mj.smp.damage import Damage, DamageSpec, flag_damage, soft_bending_rate
+from tca_mj.smp.fixing import SpineState, advance, spring
+from tca_mj.smp.heater import HeaterSpec, HeaterState, heat_spine
+from tca_mj.smp.material import SpineSpec
+from tca_mj.tca import Pull, TcaBank, TcaSpec, TcaState
+
+Array = NDArray[np.float64]
+
+# Outer diameter of the silicone tube round the TCA: an estimate, half the module's 5 mm [m].
+TUBE_DIAMETER = 2.5e-3
+
+
+class ModuleSolveError(ArithmeticError):
+    """The balance of the module's torques was not found."""
+
+
+def sheathed(tca: TcaSpec, spine: SpineSpec, tube_capacity: float) -> TcaSpec:
+    """A TCA in its tube, U-shaped along the spine and unloaded when the spine is straight.
+
+    Args:
+        tca: The kind of TCA; it is cut to twice the spine's length.
+        spine: The spine.
+        tube_capacity: Heat capacity of what of the tube is heated with the TCA [J/K].
+    """
+    length = 2.0 * spine.length
+    area = math.pi * TUBE_DIAMETER * length
+    return replace(tca.of_length(length), sheath_capacity=tube_capacity, sheath_area=area)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ModuleState:
+    """State of one module, each array of shape (1,).
+
+    Attributes:
+        heater: Temperature and energy of the spine.
+        spine: Shape memory of the spine; its angle is that of the whole length.
+        tca: Thermal state of the TCA.
+        angle: Bending angle [rad].
+        tension: Tension of the TCA, not below 0 [N].
+        damage: Flags of the last step.
+    """
+
+    heater: HeaterState
+    spine: SpineState
+    tca: TcaState
+    angle: Array
+    tension: Array
+    damage: Damage
+
+
+class LumpedModule:
+    """A spine and a U-shaped TCA in balance: E I/L (angle - reference) = 2 a F + moment.
+
+    Attributes:
+        spine: The spine.
+        heater: Its heater.
+        bank: The TCA.
+        damage: Bounds of the damage rule.
+    """
+
+    def __init__(
+        self,
+        spine: SpineSpec,
+        heater: HeaterSpec,
+        tca: TcaSpec,
+        damage: DamageSpec | None = None,
+    ) -> None:
+        """Combines a spine, its heater and a TCA of about twice the spine's length."""
+        self.spine = spine
+        self.heater = heater
+        self.bank = TcaBank([tca])
+        self.damage = damage or DamageSpec.of(spine.smp)
+
+    def rest(self, memory: float = 0.0) -> ModuleState:
+        """Cold and unloaded, in the memorised shape [rad]."""
+        heater = HeaterState.rest(self.heater, (1,))
+        flags = np.zeros(1, dtype=bool)
+        return ModuleState(
+            heater=heater,
+            spine=SpineState.rest(self.spine.smp, np.full(1, memory), heater.temperature),
+            tca=self.bank.rest(),
+            angle=np.full(1, memory),
+            tension=np.zeros(1),
+            damage=Damage(flags, flags, flags),
+        )
+
+    def tca_length(self, angle: Array) -> Array:
+        """Length of the TCA at an angle, both legs on the inner side, shape (1,) [m]."""
+        return 2.0 * (self.spine.length - self.spine.tca_offset * angle)
+
+    def resistance(self, state: ModuleState) -> float:
+        """Resistance of the TCA, from which the angle is sensed [ohm]."""
+        return float(self.bank.resistance(state.tca, self.tca_length(state.angle))[0])
+
+    def step(
+        self,
+        state: ModuleState,
+        heater_voltage: float,
+        tca_power: float,
+        fan: bool,
+        dt: float,
+        moment: float = 0.0,
+    ) -> ModuleState:
+        """Advances by ``dt``: heat exactly, shape fixing at the old angle, then the balance.
+
+        Args:
+            state: State at the start.
+            heater_voltage: Voltage of the heater wire [V].
+            tca_power: Power of the TCA [W].
+            fan: Whether the fan cools the spine.
+            dt: Length of the step; errors are of first order in it [s].
+            moment: Uniform moment from outside, positive in the TCA's direction [N m].
+
+        Raises:
+            ValueError: If an input is out of range.
+            ModuleSolveError: If no balance is found.
+        """
+        heater = heat_spine(self.heater, state.heater, heater_voltage, fan, dt)
+        spine = advance(self.spine.smp, state.spine, state.angle, heater.temperature)
+        length = self.tca_length(state.angle)
+        before = self.bank.pull(state.tca, length)
+        tca, after = self.bank.advance(state.tca, np.full(1, tca_power), length, dt)
+        angle, pull = self._balance(spine, tca, after, state.angle, moment)
+        rise = (after.tension - before.tension) / dt if dt > 0.0 else np.zeros(1)
+        tension = np.maximum(pull.tension, 0.0)
+        damage = flag_damage(
+            modulus=spring(self.spine.smp, spine).modulus,
+            cooling=heater.temperature < state.heater.temperature,
+            tension=np.maximum(after.tension, 0.0),
+            bending_rate=soft_bending_rate(self.spine, rise),
+            spec=self.damage,
+        )
+        return ModuleState(heater, spine, tca, angle, tension, damage)
+
+    def _balance(
+        self, spine: SpineState, tca: TcaState, pull: Pull, angle: Array, moment: float
+    ) -> tuple[Array, Pull]:
+        """Newton's method from the old angle; the TCA is slack where it would push."""
+        modulus, reference = spring(self.spine.smp, spine)
+        stiffness = modulus * self.spine.second_moment / self.spine.length
+        lever = 2.0 * self.spine.tca_offset
+        for _ in range(50):
+            taut = pull.tension > 0.0
+            residual = stiffness * (angle - reference) - moment
+            residual = residual - lever * np.where(taut, pull.tension, 0.0)
+            slope = stiffness + lever * lever * np.where(taut, pull.stiffness, 0.0)
+            change = residual / slope
+            angle = angle - change
+            pull = self.bank.pull(tca, self.tca_length(angle))
+            if abs(change[0]) < 1e-12:
+                return angle, pull
+        raise ModuleSolveError(f"no balance found near {angle[0]:.4g} rad, left {change[0]:.2g}")
