@@ -1,0 +1,173 @@
+"""A published fact, what the model gives for it, and the verdict, which follows from numbers.
+
+Facts are of two kinds. A *check* has a band, and the model's value lies in it or not. A *trend* has
+a sign or an order only, because the measured curve behind it was not published. A fact that fixed
+a constant of the model is *fitted*, whatever its value: agreement with it proves nothing.
+"""
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+Verdict = Literal["held", "missed", "trend held", "trend missed", "fitted", "not covered"]
+VERDICTS: tuple[Verdict, ...] = (
+    "held", "missed", "trend held", "trend missed", "fitted", "not covered",
+)  # fmt: skip
+_UNKNOWN = "No reason is known."
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Finding:
+    """One row of a report.
+
+    Attributes:
+        source: Where the fact is printed: section or table of Sun, dissertation, Colorado State
+            University.
+        fact: What it is about, and the case.
+        published: What is printed.
+        band: What the model must give to hold it.
+        model: What the model gives.
+        verdict: See the top of this file.
+        reason: Why it is missed, to what it was fitted, or what limits the statement.
+        value: The number that was judged, in the unit of ``model``; None if there is no single one.
+    """
+
+    source: str
+    fact: str
+    published: str
+    band: str
+    model: str
+    verdict: Verdict
+    reason: str = ""
+    value: float | None = None
+
+    def __post_init__(self) -> None:
+        if self.verdict not in VERDICTS:
+            raise ValueError(f"verdict = {self.verdict!r} must be one of {VERDICTS}")
+        if self.verdict != "held" and self.verdict != "trend held" and not self.reason:
+            raise ValueError(f"reason of {self.fact!r} ({self.verdict}) must not be empty")
+
+
+def check(
+    source: str,
+    fact: str,
+    published: str,
+    value: float,
+    low: float,
+    high: float,
+    unit: str,
+    *,
+    digits: int = 1,
+    reason: str = "",
+    note: str = "",
+) -> Finding:
+    """A fact with a band: held if low <= value <= high.
+
+    Args:
+        source: As in ``Finding``.
+        fact: As in ``Finding``.
+        published: As in ``Finding``.
+        value: What the model gives, in ``unit``.
+        low: Lower end of the band; -inf if there is none.
+        high: Upper end; inf if there is none.
+        unit: Unit of the three.
+        digits: Decimals that are printed.
+        reason: Said only if the fact is missed; by default that none is known.
+        note: Said in any case.
+
+    Raises:
+        ValueError: If the band is empty or is all numbers.
+    """
+    if not (low < high and (low > -math.inf or high < math.inf)):
+        raise ValueError(f"band {low} to {high} of {fact!r} must hold some numbers and not all")
+    held = low <= value <= high
+    if low == -math.inf:
+        band = f"at most {high:.{digits}f} {unit}"
+    elif high == math.inf:
+        band = f"at least {low:.{digits}f} {unit}"
+    else:
+        band = f"{low:.{digits}f} to {high:.{digits}f} {unit}"
+    return Finding(
+        source=source, fact=fact, published=published, band=band,
+        model=f"{value:.{digits}f} {unit}", verdict="held" if held else "missed",
+        reason=_joined(note, "" if held else reason or _UNKNOWN), value=float(value),
+    )  # fmt: skip
+
+
+def trend(
+    source: str,
+    fact: str,
+    published: str,
+    order: str,
+    model: str,
+    held: bool,
+    *,
+    reason: str = "",
+    note: str = "",
+    value: float | None = None,
+    strict: bool = False,
+) -> Finding:
+    """A fact with a sign or an order.
+
+    Args:
+        source: As in ``Finding``.
+        fact: As in ``Finding``.
+        published: As in ``Finding``.
+        order: The order that is asked for.
+        model: The model's numbers.
+        held: Whether they have it.
+        reason: Said only if not; by default that none is known.
+        note: Said in any case.
+        value: As in ``Finding``.
+        strict: Whether the order is all that the source states, so that it is a check.
+    """
+    verdict: Verdict = "trend held" if held else "trend missed"
+    if strict:
+        verdict = "held" if held else "missed"
+    return Finding(
+        source=source, fact=fact, published=published, band=order, model=model,
+        verdict=verdict, reason=_joined(note, "" if held else reason or _UNKNOWN), value=value,
+    )  # fmt: skip
+
+
+def fitted(
+    source: str, fact: str, published: str, model: str, to: str, *, value: float | None = None
+) -> Finding:
+    """A fact that fixed a constant; ``to`` says which constant."""
+    return Finding(source=source, fact=fact, published=published, band="-", model=model,
+                   verdict="fitted", reason=to, value=value)  # fmt: skip
+
+
+def not_covered(source: str, fact: str, published: str, reason: str) -> Finding:
+    """A fact that needs something that is not in these models."""
+    return Finding(source=source, fact=fact, published=published, band="-", model="-",
+                   verdict="not covered", reason=reason)  # fmt: skip
+
+
+def table(findings: Iterable[Finding]) -> str:
+    """The findings as a table in Markdown, reasons not included: see ``reasons``."""
+    lines = ["| source | fact | published | band | model | verdict |", "|---" * 6 + "|"]
+    for row in findings:
+        verdict = f"**{row.verdict}**" if "missed" in row.verdict else row.verdict
+        cells = (row.source, row.fact, row.published, row.band, row.model, verdict)
+        lines.append("| " + " | ".join(cell.replace("|", "/") for cell in cells) + " |")
+    return "\n".join(lines)
+
+
+def reasons(findings: Iterable[Finding]) -> str:
+    """What there is to say about single rows, as a list in Markdown; equal reasons once."""
+    said: dict[str, list[str]] = {}
+    for row in findings:
+        if row.reason:
+            said.setdefault(row.reason, []).append(f"*{row.fact}* ({row.verdict})")
+    return "\n".join(f"* {'; '.join(rows)}: {reason}" for reason, rows in said.items())
+
+
+def tally(findings: Sequence[Finding]) -> dict[Verdict, int]:
+    """Number of findings by verdict."""
+    return {verdict: sum(row.verdict == verdict for row in findings) for verdict in VERDICTS}
+
+
+def _joined(*parts: str) -> str:
+    return " ".join(part for part in parts if part)

@@ -1,0 +1,276 @@
+"""The validation report: verdicts follow from numbers, and the page says what the code says."""
+
+import json
+import math
+import re
+from dataclasses import asdict, replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+
+from tca_mj import cli
+from tca_mj.tca import CATALOGUE
+from tca_mj.tca.catalogue import MODULE_TCAS
+from tca_mj.tca.dynamics import Load, LoadedTcas
+from tca_mj.validation import creeping, lifting, report, strokes, theories
+from tca_mj.validation.facts import Finding, check, not_covered, reasons, table, tally, trend
+
+PAGE = Path(__file__).resolve().parent.parent / "docs" / "validation.md"
+
+
+@pytest.fixture(scope="module")
+def cheap():
+    return report.cheap_findings()
+
+
+def verdicts(findings):
+    return {row.fact: row.verdict for row in findings}
+
+
+def rows_of_the_page():
+    rows = {}
+    for line in PAGE.read_text(encoding="utf-8").splitlines():
+        cells = [cell.strip() for cell in line.strip().strip("|").split(" | ")]
+        if len(cells) == 6 and cells[0] not in ("source", "---"):
+            rows[cells[1]] = cells[4], cells[5].strip("*")
+    return rows
+
+
+def test_the_page_is_what_the_models_give(cheap):
+    """After a change: python scripts/validation_page.py."""
+    page = rows_of_the_page()
+    for row in cheap:
+        model, verdict = page[row.fact]
+        assert verdict == row.verdict, row.fact
+        assert model == row.model.replace("|", "/"), row.fact
+
+
+def test_the_page_tells_of_every_fact_and_of_what_is_missed(cheap):
+    page = rows_of_the_page()
+    text = PAGE.read_text(encoding="utf-8")
+    assert len(page) == len(set(page)) > len(cheap)
+    counted = re.search(r"(\d+) facts: (\d+) held, (\d+) missed, (\d+) trend held", text)
+    found = [verdict for _, verdict in page.values()]
+    assert counted is not None
+    assert [int(n) for n in counted.groups()] == [
+        len(page), found.count("held"), found.count("missed"), found.count("trend held"),
+    ]  # fmt: skip
+    for fact, (_, verdict) in page.items():
+        if "missed" in verdict or verdict in ("fitted", "not covered"):
+            assert f"*{fact}* ({verdict})" in text
+    for subject in ("conical", "times faster", "blown air", "feels 20 or 40 g", "finger of 40 mm"):
+        assert any(subject in fact + model for fact, (model, _) in page.items()), subject
+
+
+def test_a_check_is_its_band():
+    def verdict(value, low=1.0, high=2.0):
+        return check("s", "f", "p", value, low, high, "mm", reason="far off").verdict
+
+    assert [verdict(v) for v in (0.999, 1.0, 1.5, 2.0, 2.001)] == [
+        "missed", "held", "held", "held", "missed",
+    ]  # fmt: skip
+    assert verdict(math.nan) == "missed"
+    assert check("s", "f", "p", 5.0, -math.inf, 7.0, "%").band == "at most 7.0 %"
+    assert check("s", "f", "p", 5.0, 2.0, math.inf, "%").band == "at least 2.0 %"
+    for low, high in ((2.0, 1.0), (1.0, 1.0), (-math.inf, math.inf), (math.nan, 1.0)):
+        with pytest.raises(ValueError, match="band"):
+            check("s", "f", "p", 1.5, low, high, "mm")
+
+
+def test_what_is_missed_needs_a_reason():
+    good = asdict(check("s", "f", "p", 1.5, 1.0, 2.0, "mm"))
+    with pytest.raises(ValueError, match="reason"):
+        Finding(**good | {"verdict": "missed"})
+    assert check("s", "f", "p", 3.0, 1.0, 2.0, "mm").reason == "No reason is known."
+    assert trend("s", "f", "p", "rises", "falls", False).reason == "No reason is known."
+    with pytest.raises(ValueError, match="reason"):
+        not_covered("s", "f", "p", "")
+    with pytest.raises(ValueError, match="verdict"):
+        Finding(source="s", fact="f", published="p", band="", model="", verdict="fine")  # type: ignore[arg-type]
+    assert trend("s", "f", "p", "o", "m", True, strict=True).verdict == "held"
+    assert trend("s", "f", "p", "o", "m", False, reason="r").verdict == "trend missed"
+
+
+def test_the_table_and_the_list_of_reasons():
+    rows = [check("s", "a", "p", 3.0, 1.0, 2.0, "mm", reason="heavy"),
+            check("s", "b", "p", 3.0, 1.0, 2.0, "mm", reason="heavy"),
+            check("s", "c", "p", 1.5, 1.0, 2.0, "mm", reason="never said")]  # fmt: skip
+    assert "| s | a | p | 1.0 to 2.0 mm | 3.0 mm | **missed** |" in table(rows)
+    assert reasons(rows) == "* *a* (missed); *b* (missed): heavy"
+    assert tally(rows)["missed"] == 2 and tally(rows)["held"] == 1
+
+
+def test_known_misses_are_not_hidden(cheap):
+    found = verdicts(cheap)
+    assert {fact for fact, verdict in found.items() if "missed" in verdict} >= {
+        "type-0-180, 40 g, to 150 °C", "type-1-180, 40 g, to 150 °C",
+        "stroke of type-2-200 under 10 g, to 160 °C",
+        "free stroke of type-1-200, from its mandrel",
+    }  # fmt: skip
+
+
+def test_a_wrong_contact_length_is_seen(monkeypatch):
+    """Coils that touch 7 % later: free strokes and the contractions without load are missed."""
+    wrong = {
+        name: replace(tca, minimum_pitch_angle=math.asin(0.93 * math.sin(tca.minimum_pitch_angle)))
+        for name, tca in CATALOGUE.items()
+    }
+    monkeypatch.setattr(strokes, "CATALOGUE", wrong)
+    found = verdicts([*strokes.free_strokes()[:6], *strokes.contact_stops()])
+    assert found["free stroke of type-2-180, catalogue"] == "missed"
+    assert found["type-1-180, no load, to 150 °C"] == "missed"
+
+
+def test_no_untwist_is_seen(monkeypatch):
+    still = {name: replace(tca, fibre=replace(tca.fibre, untwist_scale=0.0))
+             for name, tca in CATALOGUE.items()}  # fmt: skip
+    monkeypatch.setattr(strokes, "CATALOGUE", still)
+    assert set(verdicts(strokes.contact_stops()).values()) == {"missed"}
+    assert "missed" in verdicts(strokes.loaded_contractions()).values()
+
+
+def test_exchanged_models_are_seen(monkeypatch):
+    """Love and Castigliano the wrong way round: their order and their sizes are missed."""
+    cst, love = theories.CST, theories.LOVE
+    monkeypatch.setattr(theories, "CST", love._replace(name=cst.name))
+    monkeypatch.setattr(theories, "LOVE", cst._replace(name=love.name))
+    found = verdicts(theories.spread())
+    assert found["free-stroke-made, 2/30/60 g, 25 to 160 °C: order of the models"] == "missed"
+    assert found["free-stroke-made, 60 g, 160 °C: Love over the rod"] == "missed"
+
+
+def test_a_cone_upside_down_is_seen():
+    found = theories.cone(step=15.0)
+    good = verdicts(theories.conical(found))
+    assert set(good.values()) == {"held"}
+    upside_down = replace(found, rises=found.rises[:, ::-1])
+    assert verdicts(theories.conical(upside_down))[
+        "conical TCA: big coils pass small ones"] == "missed"  # fmt: skip
+    flat = replace(found, highest=found.lowest + 0.1)
+    assert verdicts(theories.conical(flat))["conical TCA: never all in one plane"] == "missed"
+    # The rises of whole turns add up to what is between the first and the last bound.
+    assert found.rises[0] == pytest.approx(10.6 * np.ones(5), abs=1e-2)
+
+
+def test_lengths_of_the_scan_are_those_of_the_catalogue():
+    """The set that the catalogue uses gives the contractions of the report; the best is first."""
+    choice = strokes.Choice(strokes.CATALOGUE["type-1-180"].fibre.radius, "cold", "free",
+                            "natural", False)  # fmt: skip
+    values = choice.contractions()
+    for value, (name, grams) in zip(values, strokes.CONTRACTIONS, strict=True):
+        assert value == pytest.approx(strokes.contraction(CATALOGUE[name], grams, 150.0), rel=1e-9)
+    scan = strokes.Scan.of([choice, choice._replace(radius=0.21e-3, section="hot")])
+    assert scan.errors[0] < scan.errors[1] and scan.choices[1] == choice
+    printed = np.array([4.0, 20.0, 24.0, 44.0])
+    assert scan.errors[1] == pytest.approx(np.abs(values - printed).max(), rel=1e-12)
+
+
+def test_the_four_lengths_hold_in_the_running_experiment():
+    """The plateaus of the figure are the lengths that are judged."""
+    found = creeping.experiment()
+    l1, l2, l3, l4 = creeping.four_lengths(CATALOGUE["type-1-180"], "locked")
+    begins = [time for time, _ in found.events]
+    for length, time in ((l1, begins[0]), (l2, begins[1]), (l3, begins[4] - 1.0), (l4, begins[4])):
+        at = int(np.searchsorted(found.time, time + 1e-6, side="right")) - 1
+        assert found.length[at] == pytest.approx(length, abs=0.6)
+
+
+def test_the_loop_settles_where_power_and_heat_balance():
+    """Without integral: duty = K_P e/FULL, duty V^2/R = loss (T - T_amb), displacement of T."""
+    found = lifting.lift(20, lifting.controller([10.0], [0.0]), duration=9.0)
+    tca = lifting.crept(20)
+    tcas = LoadedTcas([tca], Load.weight(0.020))
+    start = float(tcas.rest().length[0])
+
+    def displacement(temperature):
+        return 1e3 * (start - float(tcas.settle([temperature])[0]))
+
+    def excess(temperature):
+        moved = displacement(temperature)
+        ohms = float(lifting.WIRE.rest_resistance[0]) * (
+            1.0 + 0.1492537 * 1e-3 * moved / 0.110 - 0.055 * lifting.weight(20))  # fmt: skip
+        duty = 10.0 * (lifting.GOAL - moved) / lifting.FULL
+        return duty * lifting.SUPPLY**2 / ohms - float(tca.heat.loss) * (temperature - 25.0)
+
+    settled = displacement(brentq(excess, 30.0, 240.0))
+    assert found.steady[0] == pytest.approx(settled, abs=0.25)
+
+
+def test_swings_are_counted():
+    time = np.linspace(0.0, 10.0, 1001)
+    wave = lifting.GOAL + np.stack([3.0 * np.sin(math.pi * time), 0.5 * np.sin(time)], axis=1)
+    found = lifting.Response(time, wave, wave, wave)
+    assert found.swings.tolist() == [9, 0]
+    ramp = lifting.Response(time, 10.0 * time[:, None], wave, wave)
+    assert ramp.rise()[0] == pytest.approx(2.8, abs=1e-9)
+
+
+def test_a_weight_is_recognised_by_the_fall_of_the_resistance():
+    assert [lifting.recognised(lifting.felt(lifting.hung(grams))) for grams in (20, 40)] == [20, 40]
+    assert lifting.recognised(np.full(400, 7.37)) == 0
+
+
+def test_tcas_of_the_modules():
+    assert MODULE_TCAS["sensing"].rest_length == pytest.approx(0.110, rel=1e-12)
+    assert MODULE_TCAS["sensing"].fibre_length == 0.350
+    assert MODULE_TCAS["sensing"].coils == pytest.approx(CATALOGUE["type-2-180"].coils, rel=1e-12)
+    for name, length in (("gripper", 70.0), ("bending", 45.0), ("finger", 45.0)):
+        assert 1e3 * MODULE_TCAS[name].rest_length == pytest.approx(length, rel=1e-12)
+    twisting = pytest.importorskip("tca_mj.modules.twisting")
+    single = twisting.twisting_module(twisting.TwistingSpec(double=False, nodes=16)).tcas[0].spec
+    assert MODULE_TCAS["twisting"].rest_length == pytest.approx(single.rest_length, rel=1e-3)
+    with pytest.raises(TypeError):
+        MODULE_TCAS["new"] = CATALOGUE["self-coiled"]  # type: ignore[index]
+
+
+@pytest.fixture
+def quick(monkeypatch, cheap):
+    """A report without its long runs: the same writing, some of the facts."""
+    monkeypatch.setattr(report.Runs, "now", classmethod(lambda cls: None))
+    chapters = dict.fromkeys(report._CHAPTERS, cheap[:2])
+    monkeypatch.setattr(report, "all_findings", lambda runs: chapters)
+    monkeypatch.setattr(report, "draw_figures", lambda runs, out: (out / "drawn").touch())
+
+
+def test_the_command_prints_and_writes(quick, tmp_path, capsys):
+    out = tmp_path / "deep" / "folder"
+    assert cli.main(["validate", "tca", "--out", str(out)]) == 0
+    said = capsys.readouterr().out
+    assert "## Strokes (Chapter 2)" in said and "| verdict |" in said and str(out) in said
+    assert "![" not in said
+    written = (out / "report.md").read_text(encoding="utf-8")
+    assert "](validation_strokes.png)" in written
+    result = json.loads((out / "report.json").read_text(encoding="utf-8"))
+    assert sum(result["tally"].values()) == 6
+    row = result["chapters"]["Strokes (Chapter 2)"][0]
+    assert asdict(Finding(**row)) == row
+    assert (out / "drawn").exists()
+    with pytest.raises(SystemExit) as error:
+        cli.main(["validate", "gripper"])
+    assert error.value.code == 2
+
+
+def test_without_matplotlib_it_says_so_at_once(monkeypatch, tmp_path, capsys):
+    from tca_mj.validation import figures
+
+    monkeypatch.setattr(figures, "find_spec", lambda name: None)
+    assert cli.main(["validate", "tca", "--out", str(tmp_path)]) == 2
+    assert "pip install" in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_figure_has_labels_with_units_and_curves(tmp_path):
+    pytest.importorskip("matplotlib")
+    from matplotlib.figure import Figure
+
+    from tca_mj.validation import figures
+
+    figure = Figure()
+    figures.fibre_figure(figure)
+    for axis in figure.axes:
+        assert axis.get_xlabel().endswith("[°C]") and axis.get_ylabel().endswith("]")
+        assert axis.get_lines()
+    figures.draw(tmp_path / "fibre.png", 9.5, 3.8, figures.fibre_figure)
+    assert (tmp_path / "fibre.png").stat().st_size > 10_000
