@@ -2,6 +2,17 @@
 
 from tca_mj.rod.beam import BeamSpec, Outline
 from tca_mj.rod.deadload import RodSolveError
+from tca_mj.rod.problem import Segment, StrandLaw
 from tca_mj.rod.shape import RodShape
+from tca_mj.rod.static import solve_series, solve_static
 
-__all__ = ["BeamSpec", "Outline", "RodShape", "RodSolveError"]
+__all__ = [
+    "BeamSpec",
+    "Outline",
+    "RodShape",
+    "RodSolveError",
+    "Segment",
+    "StrandLaw",
+    "solve_series",
+    "solve_static",
+]

@@ -1,0 +1,159 @@
+"""The question that every static solver of soft bodies answers: bodies, strands and loads."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import KW_ONLY, dataclass
+from numbers import Real
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from tca_mj.rod.beam import BeamSpec
+from tca_mj.rod.lie import matrix_quaternion
+from tca_mj.routes import Route
+
+Array = NDArray[np.float64]
+
+_PROBES = (np.arange(512) + 0.5) / 512  # where a leg of a route is tried
+_OFF = 0.1  # part of a leg's way in the section by which its slope may miss it at the probes
+
+
+class StrandLaw(Protocol):
+    """How hard a strand pulls: a TCA at some temperature, an elastic cord."""
+
+    def __call__(self, length: float, /) -> tuple[Any, Any]:
+        """Tension, never below 0 [N], and its slope, never below 0 [N/m], at a length [m]: numbers.
+
+        The length is that of the whole route, all legs together.
+        """
+        ...
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Segment:
+    """One module of a series: a soft body, its strands and what is rigid at its two ends.
+
+    Attributes:
+        beam: The body, with the base's z axis along its centre line.
+        routes: Routes of the k strands, which are weightless.
+        tensions: For each of them its tension, at least 0 [N], or its law.
+        rotation: Axes of the base, as columns, in the frame of the previous segment's tip (of the
+            world for the first segment), shape (3, 3).
+        offset: Position of the base in that frame, shape (3,) [m].
+        mass: Rigid mass at the tip [kg].
+        centre: Centre of that mass in the tip's frame, shape (3,) [m].
+
+    Raises:
+        ValueError: If a shape is wrong, a number not finite, a tension or mass negative, the
+            rotation no rotation, or a route has no legs of the expected form.
+    """
+
+    beam: BeamSpec
+    routes: Sequence[Route]
+    tensions: Sequence[float | StrandLaw]
+    _: KW_ONLY
+    rotation: ArrayLike = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+    offset: ArrayLike = (0.0, 0.0, 0.0)
+    mass: float = 0.0
+    centre: ArrayLike = (0.0, 0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.beam, BeamSpec):
+            raise ValueError(f"beam must be a BeamSpec, got {self.beam!r}")
+        object.__setattr__(self, "routes", _tuple("routes", self.routes))
+        object.__setattr__(self, "tensions", _tuple("tensions", self.tensions))
+        if len(self.tensions) != len(self.routes):
+            raise ValueError(
+                f"tensions must be one per route, {len(self.routes)}, got {len(self.tensions)}"
+            )
+        for i, tension in enumerate(self.tensions):
+            if not callable(tension):
+                _require_not_negative(f"tensions[{i}]", tension)
+        for i, route in enumerate(self.routes):
+            _require_legs(f"routes[{i}]", route)
+        object.__setattr__(self, "rotation", _finite("rotation", self.rotation, (3, 3)))
+        matrix_quaternion(self.rotation)  # raises unless it is a rotation
+        for field in ("offset", "centre"):
+            object.__setattr__(self, field, _finite(field, getattr(self, field), (3,)))
+        _require_not_negative("mass", self.mass)
+
+
+@dataclass(frozen=True, kw_only=True, slots=True, eq=False)
+class StaticProblem:
+    """Segments in series, the first one clamped to the world, under dead loads.
+
+    Attributes:
+        segments: At least one, from base to tip.
+        tip_force: Force on the last segment's tip, world frame, shape (3,) [N].
+        tip_moment: Moment on it, world frame, shape (3,) [N m].
+        gravity: Acceleration of gravity, world frame, shape (3,) [m/s²]. It acts on the bodies'
+            line densities and the rigid masses.
+        shearable: Whether sections shear; without, the linear strain is (0, 0, v3).
+
+    Raises:
+        ValueError: If there is no segment, a shape is wrong or a number not finite.
+    """
+
+    segments: Sequence[Segment]
+    tip_force: ArrayLike = (0.0, 0.0, 0.0)
+    tip_moment: ArrayLike = (0.0, 0.0, 0.0)
+    gravity: ArrayLike = (0.0, 0.0, 0.0)
+    shearable: bool = True
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "segments", _tuple("segments", self.segments))
+        if not self.segments or not all(isinstance(each, Segment) for each in self.segments):
+            raise ValueError(f"segments must be at least one Segment, got {self.segments!r}")
+        for field in ("tip_force", "tip_moment", "gravity"):
+            object.__setattr__(self, field, _finite(field, getattr(self, field), (3,)))
+        if not isinstance(self.shearable, bool | np.bool_):
+            raise ValueError(f"shearable must be True or False, got {self.shearable!r}")
+
+
+def _tuple(field: str, values: Any) -> tuple[Any, ...]:
+    try:
+        return tuple(values)
+    except TypeError:
+        raise ValueError(f"{field} must be a sequence, got {values!r}") from None
+
+
+def _finite(field: str, values: Any, shape: tuple[int, ...]) -> Array:
+    """A read-only copy of a field that is an array."""
+    try:
+        array = np.array(values, dtype=np.float64)
+    except (TypeError, ValueError):
+        array = np.array(math.nan)
+    if array.shape != shape or not np.isfinite(array).all():
+        size = " x ".join(str(length) for length in shape)
+        raise ValueError(f"{field} must be {size} finite numbers, got {values!r}")
+    array.flags.writeable = False
+    return array
+
+
+def _require_not_negative(field: str, value: Any) -> None:
+    if not (isinstance(value, Real) and 0.0 <= float(value) < math.inf):
+        raise ValueError(f"{field} must be finite and at least 0, got {value!r}")
+
+
+def _require_legs(field: str, route: Any) -> None:
+    legs = tuple(getattr(route, "legs", ()))
+    if not legs:
+        raise ValueError(f"{field} must have at least one leg, got {route!r}")
+    for leg in legs:
+        for name in ("offset", "slope"):
+            if not callable(getattr(leg, name, None)):
+                raise ValueError(f"{field}: a leg must have the method {name}(s), got {leg!r}")
+            values = np.asarray(getattr(leg, name)(_PROBES), dtype=np.float64)
+            if values.shape != (len(_PROBES), 2) or not np.isfinite(values).all():
+                raise ValueError(
+                    f"{field}: {name}(s) must give finite numbers of shape (..., 2), got {values}"
+                )
+        slope = np.asarray(leg.slope(_PROBES), dtype=np.float64)
+        run = np.diff(np.asarray(leg.offset(np.array([0.0, 1.0])), dtype=np.float64), axis=0)[0]
+        off = float(np.abs(slope.mean(axis=0) - run).max())
+        if off > _OFF * float(np.linalg.norm(slope, axis=1).mean()) + 1e-12:
+            raise ValueError(
+                f"{field}: slope(s) must be the derivative of offset(s) by s from 0 to 1; it misses"
+                f" offset(1) - offset(0) = {run} by {off:.3g} m"
+            )
