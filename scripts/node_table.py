@@ -25,15 +25,15 @@ Build = Callable[[int], Part]
 MODULES: dict[str, tuple[Build, str, float, list[list[float]]]] = {
     "bending": (
         lambda n: bending_module(BendingSpec(nodes=n)), "tip", BendingSpec().length,
-        [[100, 25, 25], [120, 25, 25], [120, 100, 25], [140, 60, 60]],
+        [[100, 25, 25], [120, 25, 25], [120, 100, 25], [160, 90, 90], [160, 25, 25]],
     ),
     "twisting": (
         lambda n: twisting_module(TwistingSpec(nodes=n)), "tip", TwistingSpec().length,
-        [[80], [100], [120]],
+        [[80], [120], [160]],
     ),
     "finger": (
         lambda n: finger_pair(FingerPairSpec(nodes=n)), "tip0", FingerPairSpec().length / 2,
-        [[25], [100], [120], [140]],
+        [[25], [100], [120], [140], [160]],
     ),
 }  # fmt: skip
 

@@ -4,22 +4,31 @@ The TCAs' law F(l, T) is evaluated once per ``tca_period`` and handed to MuJoCo 
 length, F + k (l' - l), as a native actuator that MuJoCo evaluates in every physics step. Holding
 the tension constant instead would make a stiff TCA a delayed spring, which oscillates.
 
-The tendons are polylines through sites. Each TCA's length is that of the smooth curve which its
-polyline stands for, l + ½ Σ c θ², with the coefficients c of ``RoutedTca.stiffening``; the joints
-get the matching springs c F, so that the tension does the work that the length says.
+MuJoCo's tendons are polylines through sites, its bodies chains of hinges. A TCA's length is that
+of the smooth curve that its polyline stands for, and the joints get springs that make the tension
+do the work that this length says: see ``tca_mj.model.smooth``.
+
+MuJoCo leaves a force that is clamped out of its implicit step: a slack TCA has no stiffness. In
+the unloaded shape cold TCAs are just between slack and taut, and the sign of a rounding would
+decide; a first step from rest differs by a tenth between the two. Every TCA therefore pulls
+1e-10 N more than its law, far above any rounding and far below any weight: at rest it is taut.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
+from typing import Any, Literal
 
 import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tca_mj.model.part import Part
-from tca_mj.tca import CoilSolveError, Pull, TcaBank, TcaState
+from tca_mj.model.smooth import SmoothBody
+from tca_mj.model.spines import Spines
+from tca_mj.tca import CalibrationError, CoilSolveError, Pull, TcaBank, TcaSpec, TcaState
+from tca_mj.tca.arrays import floats
 
+_TAUT = 1e-10  # tension added to each TCA's law, so that at rest it is taut [N]
 # Warnings after which MuJoCo has reset the state by itself.
 _DIVERGENCE = {
     int(warning): str(warning).rsplit("_", 1)[-1]
@@ -48,10 +57,18 @@ class Simulation:
         tca_names: Names, in the order of the actuator axis.
         tendon: Ids of their tendons in ``model``, shape (n,).
         tca_period: Time between two updates of the TCAs [s].
+        spines: The shape-memory spines, if there are any.
+        gain: Factor of every tension over the TCAs' law, see ``tca_mj.variation``.
     """
 
     def __init__(
-        self, part: Part, *, timestep: float = 2e-3, tca_period: float = 2e-2, ambient: float = 25.0
+        self,
+        part: Part,
+        *,
+        timestep: float = 2e-3,
+        tca_period: float = 2e-2,
+        ambient: float = 25.0,
+        law: Literal["rod", "surface"] = "surface",
     ) -> None:
         """Compiles ``part``; its specification can still be changed and compiled again.
 
@@ -60,13 +77,17 @@ class Simulation:
             timestep: Physics time step [s].
             tca_period: Time between two updates of the TCAs, a multiple of ``timestep`` [s].
             ambient: Temperature of the surroundings and of the cold TCAs [°C].
+            law: What computes the TCAs' tensions, see ``TcaBank``. If a coil has no "surface",
+                which no published one lacks, the exact "rod" takes its place; ``bank.law`` tells.
 
         Raises:
-            ValueError: If a time is not positive or the period is no multiple of the time step.
+            ValueError: If a time is not positive or the period is no multiple of the time step, or
+                if there is no such ``law``.
         """
         if not (np.isfinite(timestep) and timestep > 0.0):
             raise ValueError(f"timestep must be finite and above 0 s, got {timestep}")
-        substeps = round(tca_period / timestep) if np.isfinite(tca_period) else 0
+        ratio = tca_period / timestep
+        substeps = round(ratio) if np.isfinite(ratio) else 0
         if substeps < 1 or abs(substeps * timestep - tca_period) > 1e-9:
             raise ValueError(
                 f"tca_period must be a positive multiple of timestep {timestep} s, got {tca_period}"
@@ -76,8 +97,9 @@ class Simulation:
         self.data = mujoco.MjData(self.model)
         self.tca_period = tca_period
         self.tca_names = tuple(tca.name for tca in part.tcas)
-        self.bank = TcaBank(tuple(replace(tca.spec, ambient=ambient) for tca in part.tcas))
+        self.bank = _bank(tuple(replace(tca.spec, ambient=ambient) for tca in part.tcas), law)
         self._substeps = substeps
+        self.gain = 1.0
 
         model = self.model
         self.tendon = np.array([model.tendon(name).id for name in self.tca_names], dtype=np.int64)
@@ -85,23 +107,16 @@ class Simulation:
             [model.actuator(name).id for name in self.tca_names], dtype=np.int64
         )
 
-        # Joints whose stiffness depends on the tensions: k = k0 + coupling @ tension.
-        self._joint, self._coupling = _matrix(model, [tca.stiffening for tca in part.tcas])
-        self._joint_qpos = model.jnt_qposadr[self._joint]
-        self._stiffness = model.jnt_stiffness[self._joint].copy()
-        self._spring = model.qpos_spring[self._joint_qpos].copy()
-        # The stiffness from a tendon's change of direction is explicit in MuJoCo. Damping, which
-        # is implicit, of that stiffness times the time step keeps it stable at any tension.
-        hinge, self._geometric = _matrix(model, [tca.geometric for tca in part.tcas])
-        self._hinge_dof = model.jnt_dofadr[hinge]
-        self._damping = model.dof_damping[self._hinge_dof].copy()
+        self._body = SmoothBody(model, part.tcas)
+        # What is renewed only every period needs more damping than the time step (by trial).
+        self._steady = max(timestep, 0.4 * tca_period)
+        self.spines = Spines(part.spines, self._body, self.tca_names, ambient)
 
         # The bodies' unloaded shape is that of their springs; TCAs are measured from there.
         scalar = model.jnt_type >= int(mujoco.mjtJoint.mjJNT_SLIDE)
         address = model.jnt_qposadr[scalar]
         self.data.qpos[address] = model.qpos_spring[address]
         self._start = self.data.qpos.copy()
-        self._locate()
         rest = np.array([tca.spec.rest_length + tca.stretch for tca in part.tcas])
         self._length_offset = np.zeros(self.n)
         self._length_offset = rest - self.length
@@ -114,7 +129,8 @@ class Simulation:
 
         Args:
             place: Called with the data to put the robot and its objects where they start, before
-                anything is computed from it.
+                anything is computed from it. Shape-memory spines are cold and fixed in the shape
+                that it leaves them in.
         """
         model, data = self.model, self.data
         mujoco.mj_resetData(model, data)
@@ -123,8 +139,9 @@ class Simulation:
             place(data)
         self.tca = self.bank.rest()
         self.power = np.zeros(self.n)
-        self._locate()
-        self._hand_over(self.bank.pull(self.tca, self.length))
+        self._strained = self._body.at(data.qpos)
+        self.spines.reset(self._strained.motion)
+        self._hand_over(self.bank.pull(self.tca, self._strained.length + self._length_offset))
         mujoco.mj_forward(model, data)
 
     def _locate(self) -> None:
@@ -151,13 +168,14 @@ class Simulation:
     @property
     def length(self) -> NDArray[np.float64]:
         """Length of each TCA along its route, shape (n,) [m]."""
-        angle = self.data.qpos[self._joint_qpos]
-        smooth = 0.5 * ((angle * angle) @ self._coupling)
-        return self.data.ten_length[self.tendon] + smooth + self._length_offset
+        return self._body.at(self.data.qpos).length + self._length_offset
 
     @property
     def tension(self) -> NDArray[np.float64]:
-        """Tension each TCA exerts on the body, shape (n,) [N]; a slack TCA has none."""
+        """Tension each TCA exerts on the body, shape (n,) [N]; a slack TCA has none.
+
+        It is 1e-10 N above the law's, see the top of this file.
+        """
         return 0.0 - self.data.actuator_force[self._actuator]
 
     @property
@@ -179,20 +197,35 @@ class Simulation:
 
         return Physics(wrapper.MjData(self.data))
 
-    def step(self, power: ArrayLike, duration: float) -> None:
+    def step(
+        self,
+        power: ArrayLike,
+        duration: float,
+        *,
+        voltage: ArrayLike = 0.0,
+        fan: ArrayLike = False,
+    ) -> None:
         """Advances by ``duration`` [s] at constant electrical ``power``, shape (n,) [W].
 
+        Args:
+            power: Power of the TCAs, shape (n,) [W].
+            duration: Time to advance by [s].
+            voltage: Voltage of the spines' heaters, shape (spines.n,) or one for all [V].
+            fan: Whether air is blown at the spines, shape (spines.n,) or one for all.
+
         Raises:
-            ValueError: If the power has the wrong shape, is negative or not finite, or the
-                duration is no multiple of ``tca_period``.
+            ValueError: If the power has the wrong shape, is negative or not finite, the voltage
+                or the fan has the wrong shape or is not finite, or the duration is no multiple of
+                ``tca_period``.
             SimulationDiverged: If the state is no longer finite, or a TCA is shorter, longer or
                 hotter than its law holds for.
         """
-        power = np.array(power, dtype=np.float64)
+        power = np.array(floats("power", power))
         if power.shape != (self.n,):
             raise ValueError(f"power must have shape ({self.n},), got {power.shape}")
         if not (np.isfinite(power).all() and (power >= 0.0).all()):
             raise ValueError(f"power must be finite and at least 0 W, got {power}")
+        voltage, fan = self.spines.checked(voltage, fan)
         updates = round(duration / self.tca_period) if np.isfinite(duration) else 0
         if updates < 1 or abs(updates * self.tca_period - duration) > 1e-9:
             raise ValueError(
@@ -202,33 +235,40 @@ class Simulation:
         model, data = self.model, self.data
         self.power = power
         for _ in range(updates):
-            length = self.length
+            self._strained = self._body.at(data.qpos)
+            length = self._strained.length + self._length_offset
             self._check_length(length)
+            heat = self.tca
             try:
                 self.tca, pull = self.bank.advance(self.tca, power, length, self.tca_period)
             except (CoilSolveError, ValueError) as error:  # far too hot for the law
                 raise SimulationDiverged(
                     f"the TCAs have no state at {self.time:.3f} s: {error}"
                 ) from error
+            if self.spines.n:
+                before = self.bank.pull(heat, length).tension
+                rise = (pull.tension - before) / self.tca_period
+                self.spines.advance(
+                    voltage, fan, self._strained.motion,
+                    self.gain * pull.tension, self.gain * rise, self.tca_period,
+                )  # fmt: skip
             self._hand_over(pull)
             mujoco.mj_step(model, data, self._substeps)
         self._check()
 
     def _hand_over(self, pull: Pull) -> None:
-        """Gives MuJoCo the law F + k (l' - l) and the chains the stiffness they are owed."""
+        """Gives MuJoCo the law F + k (l' - l) and the joints the springs that go with it."""
+        pull = Pull(self.gain * pull.tension, self.gain * pull.stiffness, pull.length)
         self.pull = pull
         model = self.model
+        self._locate()
         tendon_length = self.data.ten_length[self.tendon]
         bias = model.actuator_biasprm
-        bias[self._actuator, 0] = -pull.tension + pull.stiffness * tendon_length
+        bias[self._actuator, 0] = -(pull.tension + _TAUT) + pull.stiffness * tendon_length
         bias[self._actuator, 1] = -pull.stiffness
         tension = np.maximum(pull.tension, 0.0)
-        stiffness = self._stiffness + self._coupling @ tension
-        model.jnt_stiffness[self._joint] = stiffness
-        steady = model.opt.timestep * (self._geometric @ tension)
-        model.dof_damping[self._hinge_dof] = self._damping + steady
-        # The added spring pulls towards the straight joint, the body's own to its reference.
-        model.qpos_spring[self._joint_qpos] = self._stiffness * self._spring / stiffness
+        self._body.support(self.data, self._strained, tension)
+        self._body.steady(self._strained, tension, self._steady)
 
     def _check_length(self, length: NDArray[np.float64]) -> None:
         inside = (length > self.bank.shortest) & (length < self.bank.longest)
@@ -252,14 +292,8 @@ class Simulation:
             )
 
 
-def _matrix(
-    model: mujoco.MjModel, columns: Sequence[Sequence[tuple[str, float]]]
-) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Ids of the joints named in any column, and their values, shape (joints, columns)."""
-    joints = sorted({model.joint(name).id for column in columns for name, _ in column})
-    row = {joint: i for i, joint in enumerate(joints)}
-    matrix = np.zeros((len(joints), len(columns)))
-    for i, column in enumerate(columns):
-        for name, value in column:
-            matrix[row[model.joint(name).id], i] += value
-    return np.array(joints, dtype=np.int64), matrix
+def _bank(specs: tuple[TcaSpec, ...], law: Literal["rod", "surface"]) -> TcaBank:
+    try:
+        return TcaBank(specs, law)
+    except CalibrationError:
+        return TcaBank(specs, "rod")

@@ -7,15 +7,16 @@ from dataclasses import replace
 import mujoco
 import numpy as np
 import pytest
-from scipy.optimize import brentq
+from scipy.optimize import brentq, fsolve
 from scipy.spatial.transform import Rotation
 from scipy.special import ellipk, ellipkinc
 
 from tca_mj.model import NotSettledError, settle
 from tca_mj.model.chain import beam
 from tca_mj.model.part import Part, new_spec
+from tca_mj.model.smooth import SmoothBody
 from tca_mj.model.tendon import route_passes, route_tca
-from tca_mj.rod import BeamSpec
+from tca_mj.rod import BeamSpec, solve_static
 from tca_mj.routes import Helix, UTurn, leg_length, parallel
 from tca_mj.tca import CATALOGUE
 
@@ -64,6 +65,14 @@ SOLVED = {
         [Helix(4e-3, -1.0)], [0.01], (1e-3, 0.0, 0.0),
         (11.3829, -5.0157, 42.7893), (5.366, 18.399, 29.904), 48.1543,
     ),
+    "five turns": (
+        [Helix(4e-3, 5.0)], [0.02], (0.0, 0.0, 0.0),
+        (0.0363, 0.7705, 44.8320), (0.0, -1.922, -115.275), 125.1738,
+    ),
+    "five turns, force across": (
+        [Helix(4e-3, 5.0)], [0.02], (1e-3, 0.0, 0.0),
+        (11.0605, 0.7304, 43.1727), (-21.481, 11.728, -113.979), 125.1767,
+    ),
 }  # fmt: skip
 
 
@@ -79,26 +88,118 @@ def errors(case, nodes):
 
 @pytest.mark.parametrize("case", SOLVED)
 def test_the_error_falls_with_the_square_of_the_number_of_nodes(case):
-    coarse, fine = errors(case, 16), errors(case, 32)
-    assert coarse[0] / fine[0] == pytest.approx(4.0, abs=0.7)
-    assert coarse[1] / fine[1] == pytest.approx(4.0, abs=0.7)
-    assert abs(fine[2]) < 0.35 * abs(coarse[2]) + 1e-5
+    few = 24 if "five" in case else 16  # five nodes per turn
+    coarse, fine = errors(case, few), errors(case, 2 * few)
+    assert coarse[0] / fine[0] == pytest.approx(4.0, abs=0.3)
+    if case == "three unlike":  # a plane bend by TCAs alone: its angle is exact
+        assert coarse[1] < 1e-3
+    else:
+        assert coarse[1] / fine[1] == pytest.approx(4.0, abs=0.6)
+    assert abs(fine[2]) < 0.27 * abs(coarse[2]) + 1e-6
 
 
 @pytest.mark.parametrize(
     ("case", "tip", "rotation", "path"),
     [
-        ("parallel, force across", 0.013, 1.2, 2.5e-3),
-        ("U, force across", 0.005, 0.4, 5e-4),
-        ("three unlike", 0.004, 0.5, 1e-3),
-        ("helix", 0.013, 5.0, 3e-3),
-        ("left helix, force across", 0.004, 1.5, 1e-3),
+        ("parallel, force across", 0.003, 0.32, 1e-4),
+        ("U, force across", 0.0015, 0.13, 2e-5),
+        ("three unlike", 0.0012, 1e-3, 2e-6),
+        ("helix", 0.0024, 0.6, 5.2e-3),
+        ("left helix, force across", 0.0017, 0.11, 2.5e-3),
     ],
 )
 def test_the_error_at_eight_nodes(case, tip, rotation, path):
     """The table in the documentation."""
     found = errors(case, 8)
     assert found[0] < tip and found[1] < rotation and abs(found[2]) < path
+
+
+@pytest.mark.parametrize("case", ["five turns", "five turns, force across"])
+def test_five_turns_need_three_nodes_each(case):
+    """The rotation of 115° within a thousandth."""
+    tip, rotation, path = errors(case, 16)
+    assert tip < 1e-3 and rotation < 0.1 and abs(path) < 2e-3
+
+
+def test_a_double_helix_is_exact():
+    """It twists and shortens evenly: nothing for a cell to lose.
+
+    Balance: GJ u = -2 F a² (w + u)/|t|, EA (v - 1) = -2 F v/|t|, |t|² = v² + a² (w + u)², w the
+    turns as an angle per length.
+    """
+    force, a, rate = 0.02, 4e-3, 2.0 * math.pi * 2.5 / L
+
+    def unbalanced(x):
+        t = np.array([a * (rate + x[0]), x[1]])
+        t *= 2.0 * force / np.linalg.norm(t)
+        return BEAM.torsion * x[0] + a * t[0], EA * (x[1] - 1.0) + t[1]
+
+    u, v = fsolve(unbalanced, (0.0, 1.0), xtol=1e-13)
+    shape = settle(BEAM, [UTurn.double_helix(a, 2.5)], [force], nodes=8)
+    assert math.degrees(u * L) < -150.0
+    assert shape.strain == pytest.approx(np.tile([0, 0, u, 0, 0, v], (9, 1)), rel=1e-6, abs=1e-6)
+    assert shape.tca_length[0] == pytest.approx(2.0 * L * np.hypot(v, a * (rate + u)), rel=1e-6)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_random_bodies_within_a_hundredth_of_theory(seed):
+    """Up to 90°, loaded at the tip, at eight nodes; one of each kind of route."""
+    rng = np.random.default_rng(seed)
+    length, angle = rng.uniform(30e-3, 80e-3), rng.uniform(0.0, 2.0 * math.pi)
+    if seed % 2:
+        body = BeamSpec.circular(length=length, diameter=5e-3, young=2e5, shear=0.7e5, density=1e3)
+    else:
+        body = BeamSpec.box(
+            length=length, width=4e-3, height=6e-3, young=1e5, shear=0.4e5, density=1e3
+        )
+    routes = [
+        (Helix(2e-3, phase=angle),), (UTurn.parallel(2e-3, 1e-3, angle),),
+        parallel(3, 2e-3, angle), (Helix(2e-3, 0.8, angle),),
+    ][seed]  # fmt: skip
+    limit = min(body.bending)
+    tensions = list(rng.uniform(0.5, 1.0, len(routes)) * limit / (2e-3 * length))
+    if seed == 1:
+        tensions = [0.5 * tensions[0]]
+    load = {
+        "tip_force": 0.5 * limit / length**2 * rng.uniform(-1.0, 1.0, 3),
+        "tip_moment": 0.2 * limit / length * rng.uniform(-1.0, 1.0, 3),
+        "gravity": rng.uniform(-3.0, 3.0, 3),
+    }
+    theory = solve_static(body, routes, tensions, shearable=False, **load)
+    error = []
+    for nodes in (8, 16):
+        shape = settle(body, routes, tensions, nodes=nodes, **load)
+        turn = Rotation.from_matrix(shape.rotation[-1].T @ theory.rotation[-1]).magnitude()
+        error.append([np.linalg.norm(shape.tip - theory.tip) / length, turn])
+        assert shape.tca_length == pytest.approx(theory.tca_length, rel=0.02 / nodes)
+        assert shape.base_force == pytest.approx(theory.base_force, abs=1e-9)
+    assert 5.0 < math.degrees(theory.bend_angle) < 100.0
+    assert error[0][0] < 0.01 and math.degrees(error[0][1]) < 1.0
+    assert np.divide(*error) == pytest.approx([4.0, 4.0], abs=0.3)
+
+
+def test_a_tca_may_pull_by_a_law():
+    """Springs with slack: the same shape as with the tensions that come out."""
+    laws = [
+        lambda length: (max(0.0, 1.5 * (length - 0.03)), 1.5 if length > 0.03 else 0.0),
+        lambda length: (max(0.0, 0.5 * (length - 0.06)), 0.5 if length > 0.06 else 0.0),
+    ]
+    routes = [TCA, Helix(4e-3, phase=2.0)]
+    shape = settle(BEAM, routes, laws, nodes=8, tip_force=(0.0, 5e-4, 0.0))
+    tension = [law(length)[0] for law, length in zip(laws, shape.tca_length, strict=True)]
+    assert 0.005 < tension[0] < 0.02 and tension[1] == 0.0
+    same = settle(BEAM, routes, tension, nodes=8, tip_force=(0.0, 5e-4, 0.0))
+    assert same.position == pytest.approx(shape.position, abs=1e-10)
+
+
+def test_a_tca_may_run_outside_of_the_body():
+    """The published module has its TCAs at 4 mm in a body of 4.5 mm diameter."""
+    thin = BeamSpec.circular(
+        length=L, diameter=4.5e-3, young=0.125e6, shear=0.125e6 / 3.0, density=1070.0
+    )
+    assert settle(thin, [TCA], [0.02], nodes=8).tip == pytest.approx(
+        settle(BEAM, [TCA], [0.02], nodes=8).tip, abs=1e-9
+    )
 
 
 def test_the_length_of_a_tca_is_what_its_tension_works_on():
@@ -130,11 +231,11 @@ def test_a_parallel_tca_bends_to_an_arc(force, tip, angle):
     assert math.degrees(curvature * L) == pytest.approx(angle, abs=0.05)
     tip = arc(curvature, stretch)
     error = {n: off(settle(BEAM, [TCA], [force], nodes=n), tip) for n in (8, 16)}
-    assert error[8] < {0.01: 0.001, 0.02: 0.004, 0.04: 0.019}[force]
+    assert error[8] < {0.01: 0.001, 0.02: 0.0025, 0.04: 0.007}[force]
     assert error[8] / error[16] == pytest.approx(4.0, abs=0.1)
-    shape = settle(BEAM, [TCA], [force], nodes=32)
-    assert shape.bend_angle == pytest.approx(curvature * L, rel=1.5e-3)
-    assert shape.tca_length[0] == pytest.approx((stretch - curvature * 4e-3) * L, rel=1e-3)
+    shape = settle(BEAM, [TCA], [force], nodes=4)
+    assert shape.bend_angle == pytest.approx(curvature * L, rel=1e-9)
+    assert shape.tca_length[0] == pytest.approx((stretch - curvature * 4e-3) * L, rel=1e-9)
 
 
 def test_the_strains_are_those_of_the_arc():
@@ -142,29 +243,26 @@ def test_the_strains_are_those_of_the_arc():
     shape = settle(BEAM, [TCA], [0.02], nodes=8)
     assert np.ptp(shape.strain, axis=0) == pytest.approx(np.zeros(6), abs=1e-6)
     theory = [0.0, 0.02 * 4e-3 / EI, 0.0, 0.0, 0.0, 1.0 - 0.02 / EA]
-    assert shape.strain[0] == pytest.approx(theory, rel=0.006, abs=1e-6)
+    assert shape.strain[0] == pytest.approx(theory, rel=1e-9, abs=1e-6)
     assert shape.arc_length == pytest.approx(np.linspace(0.0, L, 9))
     assert shape.position.shape == (9, 3) and shape.rotation.shape == (9, 3, 3)
     assert shape.position[0] == pytest.approx(np.zeros(3), abs=1e-18)
 
 
 @pytest.mark.parametrize(("force", "nodes"), [(0.01, 8), (0.02, 8), (0.01, 16), (0.04, 16)])
-def test_without_the_correction_the_polyline_bends_too_far(monkeypatch, force, nodes):
-    """The chord softens a node by F h/4 and adds x/(1 - x) to the angle, x = F h²/(4 EI).
+def test_without_springs_for_it_the_polyline_bends_too_far(monkeypatch, force, nodes):
+    """EI θ/h = F (a cos(θ/2) + h/2 sin(θ/2)) for a node, where theory has EI θ/h = F a."""
+    cell = L / nodes
 
-    With the correction the lever arm a cos(θ/2) is left, an error of the order of θ²/8, θ the
-    angle of a node.
-    """
-    theory = force * 4e-3 / EI * L
-    chord = force * (L / nodes) ** 2 / (4.0 * EI)
-    corrected = settle(BEAM, [TCA], [force], nodes=nodes).strain[0, 1] * L / theory - 1.0
+    def unbalanced(angle):
+        chord = 0.5 * (1.0 - force / EA) * cell
+        lever = 4e-3 * math.cos(0.5 * angle) + chord * math.sin(0.5 * angle)
+        return EI * angle / cell - force * lever
 
-    module = sys.modules["tca_mj.model.settle"]
-    routed = module._routed
-    monkeypatch.setattr(module, "_routed", lambda *a: replace(routed(*a), stiffening=()))
-    plain = settle(BEAM, [TCA], [force], nodes=nodes).strain[0, 1] * L / theory - 1.0
-    assert plain - corrected == pytest.approx(chord / (1.0 - chord), rel=0.02)
-    assert -0.15 * (theory / nodes) ** 2 < corrected < 0.0
+    monkeypatch.setattr(SmoothBody, "support", lambda *_: None)
+    plain = settle(BEAM, [TCA], [force], nodes=nodes).strain[0, 1] * cell
+    assert plain == pytest.approx(brentq(unbalanced, 0.0, 1.0), rel=1e-3)
+    assert plain / (force * 4e-3 / EI * cell) - 1.0 > 0.005
 
 
 @pytest.mark.parametrize("nodes", [1, 2, 8])
@@ -287,7 +385,7 @@ def test_turning_route_and_load_turns_the_shape():
     force = np.array([5e-4, 1e-3, 0.0])
     shape = settle(BEAM, [TCA], [0.02], nodes=16, tip_force=force)
     turned = settle(BEAM, [Helix(4e-3, phase=0.7)], [0.02], nodes=16, tip_force=turn @ force)
-    assert np.linalg.norm(turned.tip - turn @ shape.tip) / L < 2e-3
+    assert turned.tip == pytest.approx(turn @ shape.tip, abs=1e-9)
 
 
 def scaled(factor):
@@ -417,7 +515,7 @@ def test_a_stretched_tca_is_shorter_than_its_route():
         (lambda: built(motions=("bend",)), r"motions must be some of .*, got \('bend',\)"),
         (lambda: built(motions=()), r"motions must be some of .*, got \(\)"),
         (lambda: lay(Helix(5e-3)), r"route of tca must stay inside .* \(0\.00500, 0\.00000\) m"),
-        (lambda: lay(Helix(4e-3, 5.0)), "at least four sites per turn, got 1.60"),
+        (lambda: lay(Helix(4e-3, 5.0)), "at least three sites per turn, got 1.60"),
         (lambda: lay(TCA, sites=10), "sites of tca must be between 2 and the 9 pieces .*, got 10"),
         (lambda: lay(TCA, sites=1), "sites of tca must be between 2 and the 9 pieces .*, got 1"),
         (lambda: lay(TCA, length=0.044), r"route's length 0\.045000 m, got 0\.044000 m"),
@@ -449,7 +547,9 @@ def test_parts_are_attached_by_name():
     assert whole.sites["upper.tip"] == "upper.tip"
     model = whole.spec.compile()
     assert {model.tendon(tca.name).id for tca in whole.tcas} == {0, 1}
-    assert all(model.joint(joint).id >= 0 for tca in whole.tcas for joint, _ in tca.stiffening)
+    crossings = [crossing for tca in whole.tcas for crossing in tca.crossings]
+    assert len(crossings) == 4
+    assert all(model.joint(name).id >= 0 for item in crossings for name in item.joints.values())
     with pytest.raises(ValueError, match="to must be a site of this part, .* got 'top'"):
         whole.attach(part(), to="top", prefix="third")
     with pytest.raises(ValueError, match=r"names unique, \['upper\.tca'\] exist already"):
@@ -466,7 +566,6 @@ def test_parts_are_attached_by_name():
         ({"tip_moment": (0.0, 1.0, math.inf)}, "tip_moment must be 3 finite numbers"),
         ({"gravity": 9.81}, "gravity must be 3 finite numbers, got 9.81"),
         ({"nodes": 0}, "nodes must be at least 1, got 0"),
-        ({"routes": [Helix(6e-3)]}, "route of tca0 must stay inside the body"),
     ],
 )
 def test_bad_questions_are_refused(change, message):
@@ -478,6 +577,7 @@ def test_bad_questions_are_refused(change, message):
 def test_a_chain_without_rest_says_how_far_off_it_is(monkeypatch, tmp_path):
     """A force that no small shape of the beam can bear; MuJoCo warns in its log file."""
     monkeypatch.chdir(tmp_path)
-    with pytest.raises(NotSettledError, match="allowed 1e-10") as caught:
+    monkeypatch.setattr(sys.modules["tca_mj.model.settle"], "_MOST", 50)
+    with pytest.raises(NotSettledError, match="allowed 1e-11") as caught:
         settle(BEAM, [TCA], [5.0], nodes=8)
     assert caught.value.residual > 1e-6

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tca_mj.rod.beam import BeamSpec, require_count
+from tca_mj.rod.lie import quaternion_exp, quaternion_matrix
 
 Motion = Literal["stretch", "bend_x", "bend_y", "twist"]
 MOTIONS: tuple[Motion, ...] = ("stretch", "bend_x", "bend_y", "twist")
@@ -124,7 +125,11 @@ def beam(
         reach = length / 2.0 if node == 0 else length
         piece = piece.add_body(name=f"{name}.piece{node + 1}", pos=[0.0, 0.0, reach])
         order = kept if node % 2 == 0 else kept[::-1]
-        joints.append({m: _add_joint(piece, spec, cell, m, f"{name}.{m}{node}") for m in order})
+        rest = _hinge_angles(cell * np.array(spec.curvature), reverse=order != kept)
+        names = {m: f"{name}.{m}{node}" for m in order}
+        for motion in order:
+            _add_joint(piece, spec, cell, motion, rest, names[motion])
+        joints.append(names)
         share = 1.0 if node < nodes - 1 else 0.5
         look.dress(piece, share * length, share, f"{name}.skin{node + 1}")
         pieces.append(piece)
@@ -140,9 +145,22 @@ def beam(
     )
 
 
+def _hinge_angles(turn: NDArray[np.float64], *, reverse: bool) -> NDArray[np.float64]:
+    """Angles of hinges about x, y, z, in this or the reverse order, that make a rotation [rad]."""
+    r = quaternion_matrix(quaternion_exp(-turn if reverse else turn))
+    angles = np.array([np.arctan2(-r[1, 2], r[2, 2]), np.arcsin(r[0, 2]),
+                       np.arctan2(-r[0, 1], r[0, 0])])  # fmt: skip
+    return -angles if reverse else angles
+
+
 def _add_joint(
-    body: mujoco.MjsBody, spec: BeamSpec, cell: float, motion: Motion, name: str
-) -> str:
+    body: mujoco.MjsBody,
+    spec: BeamSpec,
+    cell: float,
+    motion: Motion,
+    rest: NDArray[np.float64],
+    name: str,
+) -> None:
     stiffness = {
         "stretch": spec.stretching,
         "bend_x": spec.bending[0],
@@ -156,9 +174,8 @@ def _add_joint(
         axis=list(_AXIS[motion]),
         stiffness=[stiffness, 0.0, 0.0],
         damping=[spec.damping_time * stiffness, 0.0, 0.0],
-        springref=cell * spec.curvature[_REFERENCE[motion]] if hinge else 0.0,
+        springref=rest[_REFERENCE[motion]] if hinge else 0.0,
     )
-    return name
 
 
 @dataclass(frozen=True, slots=True)

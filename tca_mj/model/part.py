@@ -1,10 +1,11 @@
-"""A built piece of a robot: a MuJoCo specification and the TCAs that run in it."""
+"""A built piece of a robot: a MuJoCo specification, and the TCAs and spines in it."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import mujoco
 
+from tca_mj.model.spine import RoutedSpine
 from tca_mj.model.tendon import RoutedTca
 
 
@@ -16,11 +17,13 @@ class Part:
         spec: The MuJoCo specification. Its frame is the part's base.
         tcas: The TCAs in it, in the order of a simulation's actuator axis.
         sites: Names of sites with a meaning, for example ``tip``.
+        spines: The shape-memory spines in it, in the order of a simulation's heater axis.
     """
 
     spec: mujoco.MjSpec
     tcas: tuple[RoutedTca, ...] = ()
     sites: dict[str, str] = field(default_factory=dict)
+    spines: tuple[RoutedSpine, ...] = ()
 
     def attach(
         self, child: "Part", *, to: str, prefix: str, names: Sequence[str] | None = None
@@ -36,27 +39,21 @@ class Part:
             names: Which of the child's named sites to keep, by default all.
 
         Raises:
-            ValueError: If there is no such site, or a TCA of that name exists already.
+            ValueError: If there is no such site, or a TCA or spine of that name exists already.
         """
         site = self.spec.site(to)
         if site is None:
             known = [s.name for s in self.spec.sites if ".leg" not in s.name]
             raise ValueError(f"to must be a site of this part, one of {known}, got {to!r}")
-        mine = {tca.name for tca in self.tcas}
-        renamed = tuple(
-            replace(
-                tca,
-                name=f"{prefix}.{tca.name}",
-                stiffening=tuple((f"{prefix}.{joint}", k) for joint, k in tca.stiffening),
-                geometric=tuple((f"{prefix}.{joint}", k) for joint, k in tca.geometric),
-            )
-            for tca in child.tcas
-        )
-        clash = [tca.name for tca in renamed if tca.name in mine]
+        mine = {item.name for item in self.tcas} | {item.name for item in self.spines}
+        renamed = tuple(tca.renamed(f"{prefix}.") for tca in child.tcas)
+        spines = tuple(spine.renamed(f"{prefix}.") for spine in child.spines)
+        clash = [item.name for item in (*renamed, *spines) if item.name in mine]
         if clash:
             raise ValueError(f"prefix must make the TCAs' names unique, {clash} exist already")
         self.spec.attach(child.spec, site=site, prefix=f"{prefix}.")
         self.tcas += renamed
+        self.spines += spines
         for key, value in child.sites.items():
             if names is None or key in names:
                 self.sites[f"{prefix}.{key}"] = f"{prefix}.{value}"

@@ -7,12 +7,12 @@ offset a crosses a node bent by θ with the length
     l = h cos(θ/2) - 2 a sin(θ/2)        instead of        h - a θ,
 
 so a tension F adds the spurious stiffness -F h/4 to each bending joint: the chain bends too far
-by F h²/(4 EI). The difference of the second derivatives is therefore given back to the joints as
-a spring that grows with the tension (``stiffening`` below), refreshed together with the tension.
+by F h²/(4 EI). ``RoutedTca.crossings`` says what is needed to give the difference back to the
+joints; ``tca_mj.model.smooth`` does it.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import mujoco
 import numpy as np
@@ -39,6 +39,26 @@ class Pass:
 
 
 @dataclass(frozen=True, slots=True)
+class Crossing:
+    """One leg of a TCA in one cell of a chain.
+
+    Attributes:
+        joints: Names of the joints of the cell's node, from base to tip.
+        cell: Length h of the cell [m].
+        leg: The leg.
+        span: Where the cell starts and ends along the leg, in [0, 1].
+        polyline: Second derivatives of the tendon's length by the hinges' angles in the straight
+            body [m/rad²]: per newton, the stiffness that the tension gives the hinges.
+    """
+
+    joints: dict[Motion, str]
+    cell: float
+    leg: Helix
+    span: tuple[float, float]
+    polyline: dict[Motion, float]
+
+
+@dataclass(frozen=True, slots=True)
 class RoutedTca:
     """A TCA in a built part.
 
@@ -48,18 +68,22 @@ class RoutedTca:
         path_length: Length of the smooth route in the unloaded body [m]; there the TCA has its
             rest length plus ``stretch``.
         stretch: Pre-stretch in the unloaded body, negative for a TCA with slack [m].
-        stiffening: Names of the bending joints that the polyline of sites softens, and the
-            stiffness to give back to each per newton of tension [m/rad].
-        geometric: Names of the hinges that a tension stiffens because it changes direction, and
-            that stiffness per newton [m/rad]. MuJoCo's implicit step does not know of it.
+        crossings: The cells that it crosses, one by one.
     """
 
     name: str
     spec: TcaSpec
     path_length: float
     stretch: float
-    stiffening: tuple[tuple[str, float], ...]
-    geometric: tuple[tuple[str, float], ...]
+    crossings: tuple[Crossing, ...]
+
+    def renamed(self, prefix: str) -> "RoutedTca":
+        """The same TCA in a part whose names all got ``prefix`` in front."""
+        crossings = tuple(
+            replace(item, joints={motion: prefix + name for motion, name in item.joints.items()})
+            for item in self.crossings
+        )
+        return replace(self, name=prefix + self.name, crossings=crossings)
 
 
 def route_passes(chain: Chain, route: Route) -> tuple[Pass, ...]:
@@ -75,6 +99,7 @@ def route_tca(
     name: str,
     sites: int | None = None,
     stretch: float = 0.0,
+    inside: bool = True,
 ) -> RoutedTca:
     """Lays a TCA along passes through chains and gives it a tendon and an actuator.
 
@@ -88,12 +113,14 @@ def route_tca(
         name: Its name.
         sites: Points on each chain that hold the TCA, base and tip included; by default all.
         stretch: Pre-stretch [m].
+        inside: Whether the route must stay inside the body's outline.
 
     Returns:
         The routed TCA.
 
     Raises:
-        ValueError: If the route leaves the body, has more sites than the chain has pieces, or
+        ValueError: If the route leaves the body, is a helix with less than three sites per turn,
+            has more sites than the chain has pieces, or
             its length is not the TCA's.
     """
     if not passes:
@@ -106,10 +133,10 @@ def route_tca(
         )
     width = tca.coil_radius + tca.fibre.radius  # as thick as the coil
     tendon = spec.add_tendon(name=name, width=width, rgba=[0.1, 0.2, 0.6, 1.0])
-    stiffening: dict[str, float] = {}
-    geometric: dict[str, float] = {}
+    crossings: list[Crossing] = []
     for index, item in enumerate(passes):
-        _check_inside(item, name)
+        if inside:
+            _check_inside(item, name)
         _add_mass(item, tca.mass / len(passes))
         held = _held_points(item.chain, sites, name)
         offsets = _site_offsets(item, held)
@@ -123,11 +150,7 @@ def route_tca(
                 group=4,
             )
             tendon.wrap_site(site)
-        for joint, polyline, smooth in _second_derivatives(item, held, offsets):
-            if smooth is not None:
-                stiffening[joint] = stiffening.get(joint, 0.0) + smooth - polyline
-            if polyline > 0.0:
-                geometric[joint] = geometric.get(joint, 0.0) + polyline
+        crossings += _crossings(item, held, offsets)
     actuator = spec.add_actuator(name=name)
     actuator.trntype = mujoco.mjtTrn.mjTRN_TENDON
     actuator.target = name
@@ -142,8 +165,7 @@ def route_tca(
         spec=tca,
         path_length=length,
         stretch=stretch,
-        stiffening=tuple(stiffening.items()),
-        geometric=tuple(geometric.items()),
+        crossings=tuple(crossings),
     )
 
 
@@ -181,20 +203,22 @@ def _site_offsets(item: Pass, held: NDArray[np.int64]) -> NDArray[np.float64]:
     """Offsets of the sites in their pieces' frames, shape (k, 2) [m].
 
     The chords of a helix run closer to the axis than the helix. The radius is enlarged so that
-    the lever arm about the axis, |r x t|, is that of the helix: R² sin(φ)/chord = a² φ/arc,
-    φ the angle between two sites.
+    the lever arm about the axis, |r x t|, is that of the helix: R² sin(φ)/chord = a² φ/arc, φ the
+    angle between two sites. Beyond a quarter of a turn between them it grows no more.
     """
     s = item.chain.points[held] / item.chain.beam.length
     offsets = item.leg.offset(s)
     angle = 2.0 * np.pi * abs(item.leg.turns) * float(np.max(np.diff(s)))
     if angle == 0.0 or item.leg.radius == 0.0:
         return offsets
-    if angle > 0.5 * np.pi + 1e-9:
+    if angle > 2.0 / 3.0 * np.pi + 1e-9:
         raise ValueError(
-            f"a helix needs at least four sites per turn, got {2.0 * np.pi / angle:.2f}:"
+            f"a helix needs at least three sites per turn, got {2.0 * np.pi / angle:.2f}:"
             f" give {item.chain.name} more nodes or the route fewer turns"
         )
     rise = item.chain.beam.length * float(np.max(np.diff(s)))
+    share = min(1.0, 0.5 * np.pi / angle)
+    angle, rise = share * angle, share * rise
     lever = item.leg.radius**2 * angle / np.hypot(rise, item.leg.radius * angle)
     # R² sin φ = lever sqrt(rise² + 4 R² sin²(φ/2)): a quadratic in R².
     a, b, c = np.sin(angle) ** 2, -4.0 * (lever * np.sin(angle / 2.0)) ** 2, -((lever * rise) ** 2)
@@ -205,48 +229,29 @@ def _site_offsets(item: Pass, held: NDArray[np.int64]) -> NDArray[np.float64]:
 _HINGES: tuple[Motion, ...] = ("bend_x", "bend_y", "twist")  # about x, y, z
 
 
-def _second_derivatives(
-    item: Pass, held: NDArray[np.int64], offsets: NDArray[np.float64]
-) -> list[tuple[str, float, float | None]]:
-    """How the leg's length bends with each hinge's angle, in the straight body [m/rad²].
-
-    Returns:
-        For each hinge its name, the polyline's second derivative and, for bending, that of the
-        smooth leg: per newton, the first is the stiffness that the tension gives the hinge and
-        the second the one that it ought to give.
-    """
+def _crossings(item: Pass, held: NDArray[np.int64], offsets: NDArray[np.float64]) -> list[Crossing]:
+    """The cells that a leg crosses, from base to tip."""
     chain, points = item.chain, item.chain.points
     scale = chain.piece / chain.cell
-    result: list[tuple[str, float, float | None]] = []
+    result = []
     for k in range(len(held) - 1):
-        inside = range(int(held[k]), int(held[k + 1]))  # nodes between two neighbouring sites
-        for node in inside:
+        for node in range(int(held[k]), int(held[k + 1])):  # between two neighbouring sites
             height = (node + 0.5) * chain.cell
             below = np.array([*offsets[k], scale * (points[held[k]] - height)])
             above = np.array([*offsets[k + 1], scale * (points[held[k + 1]] - height)])
-            for axis, motion in enumerate(_HINGES):
-                if motion in chain.joints[node]:
-                    polyline = _second_derivative(below, above, axis)
-                    smooth = _smooth_second_derivative(item, node, axis) if axis < 2 else None
-                    result.append((chain.joints[node][motion], polyline, smooth))
+            curving = {
+                motion: _second_derivative(below, above, axis)
+                for axis, motion in enumerate(_HINGES)
+                if motion in chain.joints[node]
+            }
+            span = (node / chain.nodes, (node + 1) / chain.nodes)
+            result.append(Crossing(chain.joints[node], chain.cell, item.leg, span, curving))
     return result
 
 
-def _second_derivative(
-    below: NDArray[np.float64], above: NDArray[np.float64], axis: int
-) -> float:
+def _second_derivative(below: NDArray[np.float64], above: NDArray[np.float64], axis: int) -> float:
     """d²|R(θ) above - below|/dθ² at θ = 0, R a rotation about ``axis`` at the origin."""
     across = [i for i in range(3) if i != axis]
     length = float(np.linalg.norm(above - below))
     first = -float(below @ np.cross(np.eye(3)[axis], above)) / length
     return (float(below[across] @ above[across]) - first**2) / length
-
-
-def _smooth_second_derivative(item: Pass, node: int, axis: int) -> float:
-    """The same for the smooth leg in a cell that bends evenly: ∫ y² ρ²/(1 + ρ²)^{3/2} ds / h²."""
-    chain = item.chain
-    s = np.linspace(node, node + 1, 17) / chain.nodes
-    lateral = item.leg.offset(s)[:, 1 - axis]
-    rho2 = np.sum(item.leg.slope(s) ** 2, axis=-1) / chain.beam.length**2
-    density = lateral**2 * rho2 / (1.0 + rho2) ** 1.5
-    return float(np.trapezoid(density, s) * chain.beam.length / chain.cell**2)

@@ -41,8 +41,8 @@ class BendingSpec:
         outer_diameter: Diameter of the body [m]. Estimate: 4.5 mm read as a radius.
         offset: Distance of the TCAs from the centre line [m]. Sun, Section 5.3.1.
         count: Number of TCAs, at equal angles from the x axis on.
-        nodes: Nodes of the chain. With 8 the tip lies within 1 % of the length of the limit of
-            many nodes up to 90°, within 2 % up to 160°.
+        nodes: Nodes of the chain. With 8 the tip lies within 1 % of the length of theory, with
+            a load too, and up to half a turn.
         tca: The kind of TCA, cut to the module's length.
 
     Raises:

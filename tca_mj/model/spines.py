@@ -1,0 +1,139 @@
+"""The shape-memory spines of a running simulation: heat, memory, and what their cells feel."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from tca_mj.model.smooth import SmoothBody
+from tca_mj.model.spine import RoutedSpine
+from tca_mj.smp import DamageSpec, SpineBank, SpinesState, flag_damage, soft_bending_rate
+
+Array = NDArray[np.float64]
+
+
+class Spines:
+    """n spines and the m motions of cells that they stiffen.
+
+    A cell may be shared by several spines, and has a stiffness of its own besides.
+
+    Attributes:
+        n: Number of spines.
+        names: Their names, in the order of the heater axis.
+        state: Heat and shape memory; None if there are no spines.
+        damaged: Whether a TCA has been contracted against a stiff spine since the last reset,
+            shape (n,).
+    """
+
+    def __init__(
+        self, spines: Sequence[RoutedSpine], body: SmoothBody, tcas: Sequence[str], ambient: float
+    ) -> None:
+        """Finds the spines' joints among the cells of ``body``, whose springs they change.
+
+        Raises:
+            ValueError: If a joint is of no cell that a TCA crosses, or a TCA does not exist.
+        """
+        self.n = len(spines)
+        self.names = tuple(spine.name for spine in spines)
+        self.damaged = np.zeros(self.n, dtype=bool)
+        self.state: SpinesState | None = None
+        if not self.n:
+            return
+        unknown = [spine.tca for spine in spines if spine.tca not in tcas]
+        if unknown:
+            raise ValueError(f"tca of a spine must be one of {tuple(tcas)}, got {unknown}")
+        self._specs = [spine.spec for spine in spines]
+        pairs = [(i, *joint) for i, spine in enumerate(spines) for joint in spine.joints]
+        owner = np.array([i for i, _, _ in pairs], np.int64)
+        self._place = body.places([name for _, name, _ in pairs])
+        self._share = np.array([share for _, _, share in pairs])
+        self._time = np.array([spine.damping_time for spine in spines])[owner]
+        heaters = [replace(spine.heater, ambient=ambient) for spine in spines]
+        self.bank = SpineBank(self._specs, heaters, owner)
+        self._tca = np.array([tcas.index(spine.tca) for spine in spines])
+        self._damage = DamageSpec.of(self.bank.smp)
+        self._body = body
+        self._own = body.stiffness.copy(), body.rest.copy(), body.damping.copy()
+
+    @property
+    def temperature(self) -> Array:
+        """Temperature of each spine, shape (n,) [°C]."""
+        return np.zeros(0) if self.state is None else self.state.heat.temperature
+
+    @property
+    def energy(self) -> Array:
+        """Electrical energy put into each heater since the last reset, shape (n,) [J]."""
+        return np.zeros(0) if self.state is None else self.state.heat.energy_in
+
+    def reset(self, motion: Array) -> None:
+        """Cold, and fixed in the cells' motions, shape (4, cells) [rad]."""
+        self.damaged = np.zeros(self.n, dtype=bool)
+        if self.n:
+            memory = self._own[1].reshape(-1)[self._place]
+            self.state = self.bank.rest(memory, motion.reshape(-1)[self._place])
+            self._stiffen(self.state)
+
+    def checked(self, voltage: ArrayLike, fan: ArrayLike) -> tuple[Array, NDArray[np.bool_]]:
+        """Voltages and fans as arrays of shape (n,).
+
+        Raises:
+            ValueError: If one has the wrong shape or is not finite.
+        """
+        voltage = np.asarray(voltage, dtype=np.float64)
+        fan = np.asarray(fan, dtype=bool)
+        for name, shape in (("voltage", voltage.shape), ("fan", fan.shape)):
+            if shape not in ((), (self.n,)):
+                raise ValueError(f"{name} must have shape ({self.n},), got {shape}")
+        if not np.isfinite(voltage).all():
+            raise ValueError(f"voltage must be finite, got {voltage}")
+        return np.broadcast_to(voltage, self.n), np.broadcast_to(fan, self.n)
+
+    def advance(
+        self,
+        voltage: Array,
+        fan: NDArray[np.bool_],
+        motion: Array,
+        tension: Array,
+        tension_rate: Array,
+        dt: float,
+    ) -> None:
+        """Heats the spines for ``dt`` and sets the springs of their cells.
+
+        Args:
+            voltage: Voltages of the heaters, shape (n,) [V].
+            fan: Whether air is blown at them, shape (n,).
+            motion: Present motion of all cells, shape (4, cells) [m, rad].
+            tension: Tensions of all TCAs [N].
+            tension_rate: Their change at constant length [N/s].
+            dt: Length of the step [s].
+        """
+        assert self.state is not None
+        before = self.state.heat.temperature
+        self.state = self.bank.advance(
+            self.state, voltage, fan, motion.reshape(-1)[self._place], dt
+        )
+        now = self.state.heat.temperature
+        rates = zip(self._specs, tension_rate[self._tca], strict=True)
+        flags = flag_damage(
+            modulus=self.bank.smp.modulus(now),
+            cooling=now < before,
+            tension=np.maximum(tension[self._tca], 0.0),
+            bending_rate=np.array([float(soft_bending_rate(spec, rate)) for spec, rate in rates]),
+            spec=self._damage,
+        )
+        self.damaged = self.damaged | flags.damaged
+        self._stiffen(self.state)
+
+    def _stiffen(self, state: SpinesState) -> None:
+        modulus, reference = self.bank.spring(state)
+        stiffness, rest, damping = self._own
+        size, added = stiffness.size, self._share * modulus
+        total = stiffness + np.bincount(self._place, added, size).reshape(stiffness.shape)
+        moment = np.bincount(self._place, added * reference, size).reshape(stiffness.shape)
+        moment += stiffness * rest
+        body = self._body
+        body.rest = np.divide(moment, total, out=rest.copy(), where=total > 0.0)
+        body.stiffness = total
+        lossy = np.bincount(self._place, self._time * added, size)
+        body.damping = damping + lossy.reshape(damping.shape)
