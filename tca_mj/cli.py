@@ -11,16 +11,20 @@ import tca_mj
 from tca_mj.registry import TASKS
 
 OBJECTS = ("screwdriver", "pcb")
+DEMOS = ("pick-and-place", "tetrapod")
 POLICIES = ("scripted", "off", "random")
 
 _EXAMPLES = """\
 examples:
   tca-mj demo pick-and-place                    the arm puts a screwdriver into a cup
   tca-mj demo pick-and-place --object pcb --seed 3 --out runs/board
+  tca-mj demo tetrapod                          the tetrapod crawls, walks, shimmies and lies down
   rerun runs/board/rollout.rrd                  look at what happened
   tca-mj list                                   the tasks
   tca-mj view TCA/ArmPickPlace-v0               watch it in a window
   tca-mj bench --out runs/bench                 how fast it is on this machine
+  tca-mj validate tca --out runs/validation     the models against what is published
+  tca-mj certify --out runs/certificate         the chains against the theory of rods
 """
 
 _DEMO = """\
@@ -30,12 +34,13 @@ Runs one scripted episode and writes into the folder --out:
   rollout.mp4    a film (needs OpenGL and `pip install 'tca-mj[demo]'`)
   rollout.png    power, temperature, tension and bend (needs `pip install 'tca-mj[demo]'`)
 
-Exit code: 0 if the object lies in the cup, 1 if not, 2 if the command was wrong, 130 after Ctrl-C,
-which keeps what was recorded until then.
+Exit code: 0 if the demo succeeds (the object lies in the cup, the tetrapod on its target), 1 if
+not, 2 if the command was wrong, 130 after Ctrl-C, which keeps what was recorded until then.
 
 examples:
   tca-mj demo pick-and-place --object pcb
   tca-mj demo pick-and-place --seed 7 --no-video      much faster
+  tca-mj demo tetrapod --randomise 0.2 --seed 3       with 20 % more or less friction
 """
 
 _VIEW = """\
@@ -47,6 +52,33 @@ Policies: scripted (the task's own), off (no power), random.
 examples:
   tca-mj view TCA/ArmPickPlace-v0
   tca-mj view TCA/ArmPickPlace-v0 --policy random --seed 1
+"""
+
+_VALIDATE = """\
+Recomputes every published fact about TCAs (Sun, dissertation, Colorado State University, Chapters 2
+and 3) and prints it beside the model's value, the band and the verdict. Takes half a minute.
+
+Writes into the folder --out:
+  report.json          the same as data
+  report.md            the same as text
+  validation_*.png     figures (needs `pip install 'tca-mj[demo]'`)
+
+A fact that is missed is no failure of the command: its exit code is 0.
+"""
+
+_CERTIFY = """\
+Compares the MuJoCo chain of every module, at its default nodes, with the theory of rods: error of
+the tip's place and rotation and of the TCAs' lengths over the working range, in cases drawn by
+seed, and the order of the error. All modules take some minutes of processor time.
+
+Modules: bending, twisting, twisting-single, finger, arm. By default all, and single claims.
+
+Writes into the folder --out:
+  report.json          the same as data, case by case
+  report.md            the same as text
+  accuracy_*.png       figures (needs `pip install 'tca-mj[demo]'`)
+
+An error beyond 1 % of the length or 2 degrees is no failure of the command: its exit code is 0.
 """
 
 _NO_DISPLAY = """\
@@ -90,10 +122,16 @@ def _parser() -> argparse.ArgumentParser:
     demo = commands.add_parser(
         "demo", help="run a scripted demo and record it", description=_DEMO, formatter_class=style
     )
-    demo.add_argument("name", choices=["pick-and-place"], help="which demo")
-    demo.add_argument("--object", choices=OBJECTS, default="screwdriver", help="what to pick up")
+    demo.add_argument("name", choices=DEMOS, help="which demo")
+    demo.add_argument(
+        "--object", choices=OBJECTS, default="screwdriver", help="what pick-and-place picks up"
+    )
+    demo.add_argument(
+        "--randomise", type=float, default=0.0, metavar="SHARE",
+        help="share by which the tetrapod's friction is drawn at random, 0 to 0.5; default 0",
+    )
     demo.add_argument("--seed", type=_seed, default=0, help="places of object and cup; default 0")
-    demo.add_argument("--out", type=_folder, help="folder; default runs/demo/OBJECT")
+    demo.add_argument("--out", type=_folder, help="folder; default runs/demo/OBJECT or /tetrapod")
     demo.add_argument(
         "--video", action=argparse.BooleanOptionalAction, default=True,
         help="make the film, which takes most of the time",
@@ -116,6 +154,23 @@ def _parser() -> argparse.ArgumentParser:
     bench.add_argument("--out", type=_folder, help="folder for benchmark.json and benchmark.md")
     bench.add_argument("--quick", action="store_true", help="a tenth of the measurements")
     bench.set_defaults(run=_bench)
+
+    validate = commands.add_parser(
+        "validate", help="compare the models with what is published", description=_VALIDATE,
+        formatter_class=style,
+    )
+    validate.add_argument("subject", choices=["tca"], help="what to validate")
+    validate.add_argument("--out", type=_folder, help="folder; default: write nothing")
+    validate.set_defaults(run=_validate)
+
+    certify = commands.add_parser(
+        "certify", help="compare the chains with the theory of rods", description=_CERTIFY,
+        formatter_class=style,
+    )
+    certify.add_argument("module", nargs="*", help="which modules; default: all")
+    certify.add_argument("--out", type=_folder, help="folder; default: write nothing")
+    certify.add_argument("--seed", type=_seed, default=0, help="of the cases; default 0")
+    certify.set_defaults(run=_certify)
     return parser
 
 
@@ -139,16 +194,24 @@ def _folder(text: str) -> Path:
 
 
 def _demo(arguments: argparse.Namespace) -> int:
-    from tca_mj.agents.demo import pick_and_place
+    from tca_mj.agents.demo import pick_and_place, tetrapod_course
 
-    out = arguments.out or Path("runs/demo") / arguments.object
+    course = arguments.name == "tetrapod"
+    out = arguments.out or Path("runs/demo") / ("tetrapod" if course else arguments.object)
     try:
-        summary = pick_and_place(
-            object=arguments.object, seed=arguments.seed, out=out, video=arguments.video
-        )
+        if course:
+            summary = tetrapod_course(
+                seed=arguments.seed, out=out, randomise=arguments.randomise, video=arguments.video
+            )
+        else:
+            summary = pick_and_place(
+                object=arguments.object, seed=arguments.seed, out=out, video=arguments.video
+            )
     except KeyboardInterrupt:
         print(f"interrupted; what was recorded is in {out}", file=sys.stderr)
         return 130
+    if course:
+        print(speed_table(summary))
     print(outcome(summary))
     for name in ["summary.json", *summary["files"]]:
         print(f"  {out / name}")
@@ -157,13 +220,30 @@ def _demo(arguments: argparse.Namespace) -> int:
 
 def outcome(summary: dict[str, Any]) -> str:
     """One line on how a demo ended, from its summary."""
-    where = "is in the cup" if summary["success"] else "is not in the cup"
+    if "object" in summary:
+        where = "is in the cup" if summary["success"] else "is not in the cup"
+        who, energy = f"the {summary['object']}", sum(summary["energy"].values())
+    else:
+        where = "lies on its target" if summary["success"] else "is not on its target"
+        who = "the tetrapod"
+        energy = sum(summary["energy"].values()) + sum(summary["heater_energy"].values())
     return (
-        f"the {summary['object']} {where} ({summary['ending']}) after"
-        f" {summary['duration']:.1f} s, {sum(summary['energy'].values()):.0f} J,"
-        f" at most {max(summary['peak_temperature'].values()):.0f} °C;"
+        f"{who} {where} ({summary['ending']}) after {summary['duration']:.1f} s,"
+        f" {energy:.0f} J, at most {max(summary['peak_temperature'].values()):.0f} °C;"
         f" simulated at {summary['real_time_factor']:.1f} times real time"
     )
+
+
+def speed_table(summary: dict[str, Any]) -> str:
+    """Headway of the course's stages against what is published, as Markdown."""
+    lines = ["| stage | time | distance | speed | published |", "|---|---|---|---|---|"]
+    for phase, row in zip(summary["phases"], summary["speeds"], strict=True):
+        published = "" if row["published"] is None else f"{1e3 * row['published']:.2f} mm/s"
+        lines.append(
+            f"| {row['name']} | {phase['duration']:.0f} s | {1e3 * row['distance']:.0f} mm |"
+            f" {1e3 * row['speed']:.2f} mm/s | {published} |"
+        )
+    return "\n".join(lines)
 
 
 def _list(arguments: argparse.Namespace) -> int:
@@ -230,6 +310,33 @@ def _bench(arguments: argparse.Namespace) -> int:
     print(report(benchmark(scale=0.1 if arguments.quick else 1.0, out=arguments.out)))
     if arguments.out:
         print(f"\n{arguments.out / 'benchmark.md'}\n{arguments.out / 'benchmark.json'}")
+    return 0
+
+
+def _validate(arguments: argparse.Namespace) -> int:
+    from tca_mj.validation.report import report, validate_tca
+
+    try:
+        print(report(validate_tca(arguments.out)))
+    except ImportError as error:
+        print(f"tca-mj validate: {error}", file=sys.stderr)
+        return 2
+    if arguments.out:
+        print(f"\n{arguments.out / 'report.md'}\n{arguments.out / 'report.json'}")
+    return 0
+
+
+def _certify(arguments: argparse.Namespace) -> int:
+    from tca_mj.certify.report import certify
+
+    try:
+        result = certify(arguments.module, out=arguments.out, seed=arguments.seed)
+    except (ImportError, ValueError) as error:
+        print(f"tca-mj certify: {error}", file=sys.stderr)
+        return 2
+    print(result["text"])
+    if arguments.out:
+        print(f"\n{arguments.out / 'report.md'}\n{arguments.out / 'report.json'}")
     return 0
 
 

@@ -12,7 +12,7 @@ import pytest
 from numpy.typing import NDArray
 from rerun.chunk import RrdReader
 
-from tca_mj.agents import demo
+from tca_mj.agents import episode
 from tca_mj.agents.demo import pick_and_place
 from tca_mj.envs.arm import ArmPickPlace
 from tca_mj.render import RenderingUnavailable, gl_backend
@@ -135,7 +135,7 @@ def test_a_second_ctrl_c_while_the_files_are_finished(
     def impatient(*_: object, **__: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(demo, "rollout_plot", impatient)
+    monkeypatch.setattr(episode, "rollout_plot", impatient)
     with pytest.raises(KeyboardInterrupt):
         pick_and_place(policy=Stub(KeyboardInterrupt()), out=tmp_path, video=False)
     assert summary_of(tmp_path)["ending"] == "interrupted"
@@ -151,7 +151,7 @@ def test_success_ends_the_demo(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
         return observation, reward, done, False, info | {"success": done}
 
     monkeypatch.setattr(ArmPickPlace, "step", lucky)
-    monkeypatch.setattr(demo, "rollout_plot", lambda *_, **__: None)
+    monkeypatch.setattr(episode, "rollout_plot", lambda *_, **__: None)
     result = pick_and_place(policy=Stub(), out=tmp_path, video=False)
     assert (result["success"], result["ending"], result["duration"]) == (True, "success", 0.3)
     assert recorded(tmp_path)[0][-1] == "success"

@@ -1,0 +1,257 @@
+"""The scripted controller of the tetrapod's course: crawl, stand up, walk, clamp, shimmy, lie down.
+
+The course is a list of stages. A stage either walks to a place with a gait, or changes the shape
+of the body: soften the spines, bend them with their TCAs to an angle, hold it, let the spines
+harden, release. All it knows is the observation.
+"""
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tca_mj.control import Gait, Thermostat
+from tca_mj.envs.course import ACTION, OBSERVATION, Places, TetrapodCourse
+
+Array = NDArray[np.float64]
+
+_TURN = (0.0, 1.0 / 3.0, 2.0 / 3.0)  # a loop of the foot: up, front, rear, one after the other
+
+CRAWL = Gait(
+    period=4.0, offset=(0.0,) * 4, start=_TURN, duty=(0.5,) * 3, hot=(165.0,) * 3, warm=(25.0,) * 3
+)
+"""All four feet run round their loops together, like the flippers of a sea turtle."""
+
+WALK = Gait(
+    period=6.0, offset=(0.75, 0.25, 0.0, 0.5), start=(0.0, 0.0, 0.5), duty=(0.25, 0.5, 0.5),
+    hot=(160.0,) * 3, warm=(60.0, 90.0, 90.0),
+)  # fmt: skip
+"""An amble: rear left, front left, rear right, front right, a quarter of a cycle apart."""
+
+PUSH = replace(WALK, offset=(0.0,) * 4)
+"""The walk with both legs of a pair together, where the body does not rest on its legs."""
+
+SHIMMY = Gait(
+    period=8.0, offset=(0.0, 0.0, 0.5, 0.5), start=_TURN, duty=(0.5,) * 3, hot=(165.0,) * 3,
+    warm=(25.0,) * 3,
+)  # fmt: skip
+"""Front and rear pair clamp the beam and push by turns, like a caterpillar."""
+
+REACH = Gait(
+    period=12.0, offset=(0.0, 0.0, 0.5, 0.5), start=(0.0, 0.2, 0.44), duty=(0.42, 0.27, 0.56),
+    hot=(172.0, 172.0, 160.0), warm=(25.0, 50.0, 50.0),
+)  # fmt: skip
+"""Slow and far: the front feet reach over the edge of the desk, land, and pull."""
+
+STEP = Gait(
+    period=4.0, offset=(0.0, 0.5, 0.5, 0.0), start=(0.0, 0.5, 0.5), duty=(0.5,) * 3,
+    hot=(150.0,) * 3, warm=(40.0,) * 3,
+)  # fmt: skip
+"""Steps with little headway: a foot that is lifted does not hold the body down by its friction."""
+
+_OFF = (25.0, 25.0, 25.0)
+_LIFTED = (172.0, 25.0, 25.0)
+_BEHIND = (25.0, 25.0, 172.0)
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Go:
+    """Move with a gait until the middle of the body is at ``until`` [m].
+
+    Attributes:
+        name: Name of the stage.
+        gait: Whose temperatures the legs follow.
+        until: Where the stage ends, along x [m].
+        patience: Time after which the stage ends wherever the body is [s].
+        steers: Whether to correct the heading by weaker legs on one side.
+        leans: Warmth of the left legs' lower TCAs over the right ones', per metre that the body is
+            off to the left [K/m]. On the ground a side that stands lower draws the walking body
+            over to it. (Astride the beam the arch of the spines centres itself.)
+        front: Temperatures of the front legs in place of the gait's [°C].
+        rear: The same of the rear legs.
+    """
+
+    name: str
+    gait: Gait
+    until: float
+    patience: float = math.inf
+    steers: bool = False
+    leans: float = 0.0
+    front: tuple[float, float, float] | None = None
+    rear: tuple[float, float, float] | None = None
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Bend:
+    """Change the shape of the body.
+
+    Attributes:
+        name: Name of the stage.
+        angle: Bend from rail to rail [rad]; None is the memorised shape, which needs no TCA.
+        steps: Gait of the legs while the body bends, so that friction does not hold it.
+        front: Temperatures of the front legs until the spines are rigid [°C].
+        then: The same from then on [°C].
+    """
+
+    name: str
+    angle: float | None
+    steps: Gait | None = None
+    front: tuple[float, float, float] = _OFF
+    then: tuple[float, float, float] = _OFF
+
+
+def stages(places: Places) -> tuple[Go | Bend, ...]:
+    """The course, stage by stage."""
+    station, edge = places.leg_station, places.second_edge
+    walking = np.radians(95.0)
+    return (
+        Go(name="crawl", gait=CRAWL, until=places.stand, steers=True),
+        Bend(name="stand up", angle=walking, steps=STEP),
+        Go(name="walk", gait=WALK, until=places.first_edge - station, leans=-1500.0),
+        # The front feet have left the desk, the rear ones push on.
+        Go(name="mount", gait=PUSH, until=places.first_edge + station + 0.010),
+        Bend(name="clamp", angle=np.radians(208.0)),
+        Go(name="shimmy", gait=SHIMMY, until=edge - station - 0.025),
+        # The front legs trail, or they would run into the desk.
+        Go(
+            name="approach", gait=SHIMMY, until=edge - station - 0.002, patience=60.0,
+            front=_BEHIND,
+        ),  # fmt: skip
+        # On the beam the rails' weight keeps the soft body from opening further.
+        Bend(name="open", angle=np.radians(104.0), front=_BEHIND, then=_LIFTED),
+        Go(name="reach", gait=REACH, until=edge + 0.030, rear=_OFF),
+        # The rear legs are lifted over the edge.
+        Go(name="climb", gait=REACH, until=edge + station + 0.014, rear=_LIFTED),
+        Go(name="walk on", gait=WALK, until=places.target, leans=-1500.0),
+        Bend(name="lie down", angle=None),
+    )
+
+
+class CourseWalker:
+    """Walks the course: ``act`` turns an observation into an action."""
+
+    soft = np.float64(116.0)  # spines are hot enough to be bent [°C]
+    rigid = np.float64(75.0)  # spines are cold enough to be let go [°C]
+    hottest = 172.0  # temperature that no TCA is to exceed [°C]
+
+    def __init__(self, env: TetrapodCourse) -> None:
+        """A controller for ``env``, of which it uses limits and places, not the state."""
+        self._dt = env.control_period
+        self._max_power = env.max_power
+        self._voltage = env.max_voltage
+        self._plan = stages(env.places)
+        self._thermostat = Thermostat(
+            heat=env.sim.bank.heat, max_power=env.max_power, max_temperature=self.hottest
+        )
+        self.reset()
+
+    def reset(self) -> None:
+        """Back to the start of the course."""
+        self._number = 0
+        self._enter()
+
+    @property
+    def phase(self) -> str:
+        """Name of the present stage; "done" at the end."""
+        return self._plan[self._number].name if self._number < len(self._plan) else "done"
+
+    def _enter(self) -> None:
+        self._time = 0.0  # in this stage, or this part of it
+        self._part = "soften"
+        self._integral = 0.0
+        self._target = 25.0  # of the spines' TCAs
+        self._angle: float | None = None
+
+    def act(self, observation: NDArray[np.float32]) -> NDArray[np.float32]:
+        """The next action."""
+        seen = OBSERVATION.read(observation)
+        if self._number < len(self._plan) and self._over(seen):
+            self._number += 1
+            self._enter()
+        legs, spines, voltage = np.full((4, 3), 25.0), 25.0, np.zeros(3)
+        if self._number < len(self._plan):
+            stage = self._plan[self._number]
+            if isinstance(stage, Go):
+                legs = self._walk(stage, seen)
+            else:
+                legs, spines, voltage = self._bend(stage, seen)
+        self._time += self._dt
+        target = np.concatenate([np.maximum(legs, 25.0).ravel(), np.full(3, spines)])
+        power = self._thermostat.power(seen["TCA temperature"], target)
+        action = np.concatenate([power / self._max_power, voltage / self._voltage])
+        return (2.0 * action - 1.0).astype(ACTION.space.dtype)
+
+    def _over(self, seen: dict[str, Array]) -> bool:
+        stage = self._plan[self._number]
+        if isinstance(stage, Go):
+            return bool(seen["position"][0] >= stage.until or self._time > stage.patience)
+        return self._part == "done"
+
+    def _walk(self, stage: Go, seen: dict[str, Array]) -> Array:
+        legs = stage.gait.temperature(self._time / stage.gait.period).reshape(4, 3)
+        if stage.steers:
+            w, _, _, z = seen["orientation"]
+            away = 2.0 * np.arctan2(z, w) + 3.0 * seen["position"][1]
+            weaker = np.clip(600.0 * away, -80.0, 80.0)
+            legs[[0, 2]] -= max(-weaker, 0.0)
+            legs[[1, 3]] -= max(weaker, 0.0)
+        warmer = np.clip(stage.leans * seen["position"][1], -60.0, 60.0)
+        legs[[0, 2], 1:] += warmer
+        legs[[1, 3], 1:] -= warmer
+        if stage.front is not None:
+            legs[:2] = stage.front
+        if stage.rear is not None:
+            legs[2:] = stage.rear
+        return legs
+
+    def _bend(self, stage: Bend, seen: dict[str, Array]) -> tuple[Array, float, Array]:
+        """Temperatures of the legs and of the spines' TCAs, and voltages of the heaters."""
+        hot, cold = seen["spine temperature"].min(), seen["spine temperature"].max()
+        boost = np.where(seen["spine temperature"] < self.soft - 1.0, self._voltage, 9.5)
+        angle = float(seen["body angle"][0])
+        before = angle if self._angle is None else self._angle
+        self._angle = before + (angle - before) * self._dt / 0.6
+        rate = (self._angle - before) / self._dt
+        error = 0.0 if stage.angle is None else float(np.degrees(stage.angle - self._angle - rate))
+        stepping, voltage = False, np.zeros(3)
+        if self._part == "soften":
+            voltage = np.full(3, self._voltage)
+            if hot > self.soft:
+                self._go_on("bend")
+        elif self._part in ("bend", "hold"):
+            voltage = boost
+            if stage.angle is None:
+                if self._time > 15.0:
+                    self._go_on("harden")
+            else:
+                gain = 0.6 if self._part == "bend" else 0.2
+                self._integral += gain * np.clip(error, -30.0, 30.0) * self._dt
+                self._integral = float(np.clip(self._integral, -60.0, 150.0))
+                wanted = 60.0 + np.clip(error, -60.0, 60.0) + self._integral
+                self._target = float(np.clip(wanted, 25.0, self.hottest))
+                if self._part == "bend":
+                    stepping = abs(error) > 3.0
+                    still = abs(error) < 5.0 and abs(rate) < np.radians(1.0)
+                    if (still and self._time > 5.0) or self._time > 60.0:
+                        self._go_on("hold")
+                elif self._time > 6.0:
+                    self._go_on("harden")
+        elif self._part == "harden":
+            if stage.angle is not None and cold > 108.0:
+                change = 0.3 * error * self._dt
+                self._target = float(np.clip(self._target + change, 25.0, self.hottest))
+            if cold < self.rigid:
+                self._go_on("release" if stage.angle is not None else "done")
+        elif self._part == "release":
+            self._target = 25.0
+            if self._time > 10.0:
+                self._go_on("done")
+        legs = np.tile(_OFF, (4, 1))
+        legs[:2] = stage.then if self._part == "release" else stage.front
+        if stepping and stage.steps is not None:
+            legs = stage.steps.temperature(self._time / stage.steps.period).reshape(4, 3)
+        return legs, self._target, voltage
+
+    def _go_on(self, part: str) -> None:
+        self._part, self._time = part, 0.0

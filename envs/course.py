@@ -1,0 +1,414 @@
+"""``TCA/TetrapodCourse-v0``: under a plate, over a beam, to a target (Sun, Section 6.3.2)."""
+
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import gymnasium as gym
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from tca_mj.assets import mjcf
+from tca_mj.envs.table import Entry, Table, numbers
+from tca_mj.model.scene import scene
+from tca_mj.render import Offscreen, colour_tendons
+from tca_mj.robots.tetrapod import LEGS, SPINES, TetrapodSpec, tetrapod
+from tca_mj.sim import Simulation, SimulationDiverged
+
+Observation = NDArray[np.float32]
+Action = NDArray[np.float32]
+
+CAMERAS = ("follow", "side", "front")
+TCAS = 3 * len(LEGS) + SPINES
+
+OBSERVATION = Table(
+    [
+        Entry("TCA temperature", TCAS, -50.0, 300.0, "°C"),
+        Entry("TCA length", TCAS, 0.0, 0.5, "m"),
+        Entry("TCA tension", TCAS, 0.0, 5.0, "N"),
+        Entry("spine temperature", SPINES, -50.0, 300.0, "°C"),
+        Entry("body angle", 1, -2.0 * np.pi, 2.0 * np.pi, "rad"),
+        Entry("position", 3, -2.0, 2.0, "m"),
+        Entry("orientation", 4, -1.0, 1.0, "quaternion wxyz"),
+        Entry("velocity", 3, -10.0, 10.0, "m/s"),
+        Entry("angular velocity", 3, -500.0, 500.0, "rad/s"),
+    ]
+)
+ACTION = Table(
+    [
+        Entry("TCA power", TCAS, -1.0, 1.0, "-"),
+        Entry("heater voltage", SPINES, -1.0, 1.0, "-"),
+    ]
+)
+
+_START = 13e-3  # height of the flat robot's middle over the desk [m]
+_TURNED = np.cos(np.radians(60.0))  # the body's z axis may not lean further
+_FLAT = np.radians(40.0)  # body angle up to which the robot lies flat
+_COLD = 80.0  # temperature up to which a spine is rigid, Sun, Section 6.1.3 [°C]
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Places:
+    """Where things are along the course, read from its file [m].
+
+    Attributes:
+        stand: Where the whole robot is beyond the plate, with a hand's breadth to spare.
+        first_edge: End of the first desk.
+        second_edge: Start of the second desk.
+        beam_end: End of the beam.
+        target: Middle of the target.
+        target_size: Half sizes of the target along x and y.
+        leg_station: Fore-aft distance of the legs' roots from the robot's middle.
+    """
+
+    stand: float
+    first_edge: float
+    second_edge: float
+    beam_end: float
+    target: float
+    target_size: tuple[float, float]
+    leg_station: float
+
+
+class TetrapodCourse(gym.Env[Observation, Action]):
+    """The whole course with one robot that changes its shape on the way.
+
+    Crawl under a plate 30 mm above the desk, stand up, walk astride a beam until it bridges the
+    gap to the next desk, clamp it, shimmy across, climb onto the desk, walk to the target, lie
+    down flat.
+
+    Action, shape (18,), all in [-1, 1]; -1 is off, 1 the largest value, linear in between:
+        0-11: power of the legs' TCAs, three of each leg: front left, front right, rear left, rear
+            right; each lifts, or draws down to the front, or down to the rear.
+        12-14: power of the spines' TCAs.
+        15-17: voltage of the spines' heaters.
+
+    Observation, shape (62,): see ``OBSERVATION``. The body angle is the bend from rail to rail;
+    position and velocity are those of the middle of the spines.
+
+    Reward, the sum of the terms in ``info["reward_terms"]``:
+        progress: 10 per metre of headway, negative for going back.
+        touch: -0.1 for each step in which the robot touches the plate or its posts.
+        damage: -5 for each spine whose TCA is for the first time contracted while it is stiff.
+        finish: 20 when the robot lies flat and rigid on the target, all of its body on it.
+        energy: Minus 1e-5 per joule.
+
+    Reset: cold, flat and at rest before the plate, moved and turned a little at random. Options:
+        position: x and y of its middle, at most 5 mm from 0 [m].
+        yaw: Heading, at most 3° [rad].
+        friction: Factor of the friction of feet and body, 0.5 to 1.5; by default 1.
+        randomise: Share by which that factor is drawn from both sides of 1, 0 to 0.5.
+
+    Terminates at the finish, which is a success if nothing was touched or damaged, or when the
+    robot has fallen. Truncates after the time limit, and with ``info["truncation_reason"]`` if a
+    TCA is too hot or torn, or if the simulation diverged.
+    """
+
+    metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 10}
+    max_power: ClassVar[NDArray[np.float64]] = np.array([4.0] * 12 + [40.0] * 3)  # [W]
+    max_voltage = 25.0  # Sun, Section 6.1.3 [V]
+    max_temperature = 180.0  # annealing temperature of the TCAs, Sun, Table 2.1 [°C]
+    control_period = 0.1  # [s]
+
+    def __init__(
+        self,
+        *,
+        render_mode: str | None = None,
+        robot: TetrapodSpec | None = None,
+        timestep: float = 5e-3,
+        tca_period: float = 2.5e-2,
+        camera: str = "follow",
+        size: tuple[int, int] = (960, 720),
+    ) -> None:
+        """Builds the scene.
+
+        Args:
+            render_mode: None or ``"rgb_array"``.
+            robot: The robot, by default the published one.
+            timestep: Physics time step [s].
+            tca_period: Time between two updates of the TCAs, a multiple of ``timestep`` [s].
+            camera: Camera of the pictures: ``follow``, ``side`` or ``front``.
+            size: Width and height of the pictures [pixels].
+
+        Raises:
+            ValueError: If an argument is unknown or the robot cannot be built.
+        """
+        if render_mode not in (None, *self.metadata["render_modes"]):
+            raise ValueError(
+                f"render_mode must be None or one of {self.metadata['render_modes']},"
+                f" got {render_mode!r}"
+            )
+        if camera not in CAMERAS:
+            raise ValueError(f"camera must be one of {CAMERAS}, got {camera!r}")
+        if numbers("size", size, (2,)).min() < 1.0:
+            raise ValueError(f"size must be at least 1 pixel each way, got {size}")
+        updates = self.control_period / tca_period if tca_period > 0.0 else 0.0
+        if not (updates > 0.5 and abs(updates - round(updates)) < 1e-9):
+            raise ValueError(
+                f"tca_period must divide the control period {self.control_period} s,"
+                f" got {tca_period}"
+            )
+        self.render_mode: str | None = render_mode
+        self.robot = robot or TetrapodSpec()
+        part = scene(mjcf("course.xml"), tetrapod(self.robot), {}, name="robot")
+        self.sim = Simulation(part, timestep=timestep, tca_period=tca_period)
+        self.observation_space = OBSERVATION.space
+        self.action_space = ACTION.space
+        self._camera, self._size = camera, size
+        self._screen: Offscreen | None = None
+        self._find(self.model)
+        self._setup: dict[str, Any] = {}
+        self.touched = False
+        self._x = 0.0
+
+    def _find(self, model: mujoco.MjModel) -> None:
+        """Looks up the addresses of what is observed and judged."""
+        self._root = int(model.jnt_qposadr[model.joint("robot.root").id])
+        bends = [
+            (model.joint(f"robot.{side}.bend_x{i}").qposadr[0], sign)
+            for side, sign in (("left", -1.0), ("right", 1.0))
+            for i in range(self.robot.nodes)
+        ]
+        self._bends = np.array([address for address, _ in bends])
+        self._signs = np.array([sign for _, sign in bends])
+        names = [model.body(int(b)).name for b in model.geom_bodyid]
+        self._own = np.array([name.startswith("robot.") for name in names])
+        self._friction = model.geom_friction.copy()
+        self._plate = {model.geom(name).id for name in ("glass", "post0", "post1")}
+
+        def end(name: str, sign: float) -> float:
+            geom = model.geom(name)
+            return float(geom.pos[0] + sign * geom.size[0])
+
+        target = model.geom("target")
+        self.places = Places(
+            stand=end("glass", 1.0) + self.robot.rail_length / 2.0 + 0.025,
+            first_edge=end("desk1", 1.0),
+            second_edge=end("desk2", -1.0),
+            beam_end=end("beam", 1.0),
+            target=float(target.pos[0]),
+            target_size=(float(target.size[0]), float(target.size[1])),
+            leg_station=self.robot.leg_station,
+        )
+
+    # What tools that know Gymnasium's own MuJoCo environments look for.
+    @property
+    def model(self) -> mujoco.MjModel:
+        """The compiled model."""
+        return self.sim.model
+
+    @property
+    def data(self) -> mujoco.MjData:
+        """MuJoCo's state."""
+        return self.sim.data
+
+    @property
+    def dt(self) -> float:
+        """Time of one step [s]."""
+        return self.control_period
+
+    @property
+    def position(self) -> NDArray[np.float64]:
+        """Position of the middle of the spines in the world, shape (3,) [m]."""
+        return self.data.qpos[self._root : self._root + 3]
+
+    @property
+    def body_angle(self) -> float:
+        """Bend of the body from rail to rail [rad]."""
+        return float(self.data.qpos[self._bends] @ self._signs)
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Observation, dict[str, Any]]:
+        """Starts an episode; see the class for the options.
+
+        Raises:
+            ValueError: If an option is unknown or out of its range.
+        """
+        super().reset(seed=seed)
+        self._setup = setup = self._drawn(options or {})
+        friction = self._friction.copy()
+        friction[self._own] *= setup["friction"]
+        self.model.geom_friction[:] = friction
+
+        def place(data: mujoco.MjData) -> None:
+            turn = [np.cos(setup["yaw"] / 2.0), 0.0, 0.0, np.sin(setup["yaw"] / 2.0)]
+            data.qpos[self._root : self._root + 7] = [*setup["position"], _START, *turn]
+
+        self.sim.reset(place)
+        self.touched = False
+        self._x = float(self.position[0])
+        return self._observe(), self._info()
+
+    def _drawn(self, options: dict[str, Any]) -> dict[str, Any]:
+        """Draws what the options leave open. All draws are made, so that options shift none."""
+        random = self.np_random
+        drawn: dict[str, Any] = {
+            "position": random.uniform(-5e-3, 5e-3, 2),
+            "yaw": random.uniform(-1.0, 1.0) * np.radians(2.0),
+            "friction": 1.0,
+            "randomise": 0.0,
+        }
+        side = random.uniform(-1.0, 1.0)
+        unknown = [key for key in options if key not in drawn]
+        if unknown:
+            raise ValueError(f"options must be some of {sorted(drawn)}, got {unknown}")
+        setup = drawn | dict(options)
+        for key, shape, low, high in (
+            ("position", (2,), -5e-3, 5e-3),
+            ("yaw", (), -np.radians(3.0), np.radians(3.0)),
+            ("friction", (), 0.5, 1.5),
+            ("randomise", (), 0.0, 0.5),
+        ):
+            value = numbers(key, setup[key], shape)
+            if value.min() < low - 1e-12 or value.max() > high + 1e-12:
+                raise ValueError(f"{key} must be between {low:g} and {high:g}, got {setup[key]}")
+            setup[key] = value
+        if "friction" not in options:
+            setup["friction"] = 1.0 + float(setup["randomise"]) * side
+        return setup
+
+    def step(self, action: Action) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
+        """Heats for ``control_period``; see the class.
+
+        Raises:
+            ValueError: If the action has the wrong shape, is not finite or out of [-1, 1].
+        """
+        command = numbers("action", action, (ACTION.size,))
+        if np.abs(command).max() > 1.0 + 1e-6:
+            raise ValueError(f"action must be within -1 and 1, got {command}")
+        command = (np.clip(command, -1.0, 1.0) + 1.0) / 2.0
+        before, harmed = self.energy, int(self.sim.spines.damaged.sum())
+        reason = None
+        try:
+            self.sim.step(
+                self.max_power * command[:TCAS],
+                self.control_period,
+                voltage=self.max_voltage * command[TCAS:],
+            )
+        except SimulationDiverged as error:
+            reason = f"diverged: {error}"
+        observation = self._observe()
+        outside = OBSERVATION.outside(observation)
+        if outside:
+            reason = reason or f"diverged: {', '.join(outside)} out of bounds"
+            observation = OBSERVATION.bounded(observation)
+        reason = reason or self._damage()
+        terms = dict.fromkeys(("progress", "touch", "damage", "finish", "energy"), 0.0)
+        finished = fallen = False
+        if reason is None:  # nothing is known of a diverged state
+            x = float(self.position[0])
+            terms["progress"], self._x = 10.0 * (x - self._x), x
+            touches = self._touches()
+            self.touched = self.touched or touches
+            finished, fallen = self._finished(), self._fallen()
+            terms["touch"] = -0.1 if touches else 0.0
+            terms["damage"] = -5.0 * (int(self.sim.spines.damaged.sum()) - harmed)
+            terms["finish"] = 20.0 if finished else 0.0
+            terms["energy"] = -1e-5 * (self.energy - before)
+        unharmed = not (self.touched or self.sim.spines.damaged.any())
+        info = {"reward_terms": terms, "success": finished and unharmed, **self._info()}
+        if reason is not None:
+            info["truncation_reason"] = reason
+        if fallen:
+            info["termination_reason"] = "fallen"
+        return (
+            observation,
+            float(sum(terms.values())),
+            finished or fallen,
+            reason is not None,
+            info,
+        )
+
+    @property
+    def energy(self) -> float:
+        """Electrical energy put into TCAs and heaters since the reset [J]."""
+        return float(self.sim.energy.sum() + self.sim.spines.energy.sum())
+
+    def _touches(self) -> bool:
+        """Whether the robot touches the plate or its posts."""
+        contact = self.data.contact
+        return any(int(g) in self._plate for g in contact.geom[: self.data.ncon].ravel())
+
+    def _finished(self) -> bool:
+        """Whether the robot lies flat and rigid with its body on the target."""
+        x, y, _ = self.position
+        half_x, half_y = self.places.target_size
+        return bool(
+            abs(x - self.places.target) <= half_x
+            and abs(y) <= half_y
+            and self.body_angle < _FLAT
+            and self.sim.spines.temperature.max() < _COLD
+        )
+
+    def _fallen(self) -> bool:
+        """Whether the robot has turned over or dropped below the desks."""
+        _, x, y, _ = self.data.qpos[self._root + 3 : self._root + 7]
+        return bool(1.0 - 2.0 * (x * x + y * y) < _TURNED or self.position[2] < -0.05)
+
+    def _damage(self) -> str | None:
+        sim = self.sim
+        if sim.temperature.max() > self.max_temperature:
+            name = sim.tca_names[int(sim.temperature.argmax())]
+            return f"{name} is above {self.max_temperature:g} °C"
+        if (sim.tension > sim.bank.breaking_force).any():
+            return "a TCA is torn"
+        return None
+
+    def _observe(self) -> Observation:
+        data, sim = self.data, self.sim
+        start = self._root
+        turn = data.qpos[start + 3 : start + 7]
+        dof = int(self.model.jnt_dofadr[self.model.joint("robot.root").id])
+        return OBSERVATION.pack(
+            {
+                "TCA temperature": sim.temperature,
+                "TCA length": sim.length,
+                "TCA tension": sim.tension,
+                "spine temperature": sim.spines.temperature,
+                "body angle": self.body_angle,
+                "position": self.position,
+                "orientation": turn if turn[0] >= 0.0 else -turn,
+                "velocity": data.qvel[dof : dof + 3],
+                "angular velocity": data.qvel[dof + 3 : dof + 6],
+            }
+        )
+
+    def _info(self) -> dict[str, Any]:
+        sim = self.sim
+        return {
+            "energy": self.energy,
+            "tca_energy": dict(zip(sim.tca_names, sim.energy.tolist(), strict=True)),
+            "heater_energy": dict(
+                zip(sim.spines.names, sim.spines.energy.tolist(), strict=True)
+            ),
+            "touched_plate": self.touched,
+            "damaged": sim.spines.damaged.copy(),
+            "body_angle": self.body_angle,
+            "position": self.position.copy(),
+            "friction": float(self._setup.get("friction", 1.0)),
+        }
+
+    def render(self) -> NDArray[np.uint8] | None:
+        """A picture of the scene, shape (height, width, 3), or None without a render mode.
+
+        Raises:
+            RenderingUnavailable: If there is no OpenGL.
+        """
+        if self.render_mode is None:
+            return None
+        if self._screen is None:
+            width, height = self._size
+            self._screen = Offscreen(self.model, width=width, height=height, camera=self._camera)
+        colour_tendons(self.model, self.sim.tendon, self.sim.temperature)
+        return self._screen.draw(self.data)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Everything but the window: a copy goes on where this one is."""
+        return self.__dict__ | {"_screen": None}
+
+    def close(self) -> None:
+        """Frees what rendering took."""
+        if self._screen is not None:
+            self._screen.close()
+            self._screen = None

@@ -1,0 +1,244 @@
+"""``TCA/TetrapodCourse-v0`` and its scripted controller."""
+
+import hashlib
+import pickle
+import warnings
+
+import gymnasium as gym
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env
+
+from tca_mj.agents.course import CRAWL, REACH, SHIMMY, WALK, Bend, CourseWalker, Go, stages
+from tca_mj.agents.demo import tetrapod_course
+from tca_mj.cli import outcome, speed_table
+from tca_mj.envs.course import ACTION, OBSERVATION, TetrapodCourse
+
+ID = "TCA/TetrapodCourse-v0"
+OFF = -np.ones(ACTION.size, dtype=np.float32)
+
+
+@pytest.fixture(scope="module")
+def shared():
+    """One environment for the tests that reset it; that resets forget everything is a test too."""
+    return TetrapodCourse()
+
+
+def bent(env, angle, x, z):
+    """Puts the robot, cold and fixed at an angle [rad], into the course."""
+
+    def place(data):
+        data.qpos[env._root], data.qpos[env._root + 2] = x, z
+        data.qpos[env._bends] = env._signs * angle / (2 * env.robot.nodes)
+
+    env.sim.reset(place)
+
+
+def rollout(env, seed=7, steps=3):
+    """Hash of all that an episode under random actions returns, to the last bit."""
+    digest = hashlib.sha256()
+    observation, info = env.reset(seed=seed, options={"randomise": 0.2})
+    actions = np.random.default_rng(seed)
+    digest.update(observation.tobytes() + np.float64(info["friction"]).tobytes())
+    for _ in range(steps):
+        action = actions.uniform(-1.0, 1.0, ACTION.size).astype(np.float32)
+        observation, reward, terminated, truncated, info = env.step(action)
+        digest.update(observation.tobytes() + np.float64(reward).tobytes())
+        digest.update(bytes([terminated, truncated]))
+    digest.update(env.unwrapped.data.qpos.tobytes() + env.unwrapped.data.qvel.tobytes())
+    return digest.hexdigest()
+
+
+def test_gymnasium_and_stable_baselines3_are_content():
+    env = gym.make(ID)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        check_env(env.unwrapped, skip_render_check=True)
+        checker = pytest.importorskip("stable_baselines3.common.env_checker")
+        checker.check_env(TetrapodCourse(), warn=True)
+    env.close()
+
+
+def test_the_same_seed_gives_the_same_bits_after_any_history(shared):
+    first = rollout(TetrapodCourse())
+    rollout(shared, seed=99)
+    assert rollout(shared) == first
+    assert rollout(shared, seed=8) != first
+    copied = pickle.loads(pickle.dumps(shared))
+    action = np.linspace(-1.0, 1.0, ACTION.size).astype(np.float32)
+    assert copied.step(action)[0].tobytes() == shared.step(action)[0].tobytes()
+
+
+def test_the_reward_is_the_sum_of_its_terms_and_headway_pays_back(shared):
+    shared.reset(seed=1)
+    start = shared.position[0]
+    random, progress = np.random.default_rng(1), 0.0
+    for _ in range(10):
+        action = random.uniform(-1.0, -0.5, ACTION.size).astype(np.float32)
+        before = shared.energy
+        _, reward, _, _, info = shared.step(action)
+        assert reward == pytest.approx(sum(info["reward_terms"].values()), rel=1e-15)
+        spent = shared.energy - before
+        assert info["reward_terms"]["energy"] == pytest.approx(-1e-5 * spent, rel=1e-9)
+        progress += info["reward_terms"]["progress"]
+    assert progress == pytest.approx(10.0 * (shared.position[0] - start), abs=1e-12)
+    assert info["energy"] == pytest.approx(
+        sum(info["tca_energy"].values()) + sum(info["heater_energy"].values())
+    )
+
+
+def test_the_observation_is_what_the_simulation_says(shared):
+    shared.reset(seed=2)
+    action = np.linspace(-1.0, 1.0, ACTION.size).astype(np.float32)
+    observation, *_ = shared.step(action)
+    rows, sim = OBSERVATION.read(observation), shared.sim
+    assert shared.observation_space.contains(observation)
+    assert rows["TCA temperature"] == pytest.approx(sim.temperature, rel=1e-6)
+    assert rows["TCA length"] == pytest.approx(sim.length, rel=1e-6)
+    assert rows["TCA tension"] == pytest.approx(sim.tension, rel=1e-5, abs=1e-7)
+    assert rows["spine temperature"] == pytest.approx(sim.spines.temperature, rel=1e-6)
+    assert rows["position"] == pytest.approx(shared.position, abs=1e-6)
+    assert rows["body angle"][0] == pytest.approx(shared.body_angle, rel=1e-6)
+    assert np.degrees(rows["body angle"][0]) == pytest.approx(20.0, abs=1.0)
+
+
+def test_an_action_is_power_and_voltage(shared):
+    shared.reset(seed=3)
+    action = OFF.copy()
+    action[4], action[13], action[17] = 1.0, 0.0, 1.0
+    *_, info = shared.step(action)
+    energy = info["tca_energy"]
+    assert energy["robot.front_right.tca1"] == pytest.approx(0.4)
+    assert energy["robot.spine1"] == pytest.approx(2.0)
+    assert sum(energy.values()) == pytest.approx(2.4)
+    heater = shared.robot.heater
+    assert info["heater_energy"]["robot.spine2"] == pytest.approx(62.5 / float(heater.resistance))
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"height": 1.0}, "options"),
+        ({"friction": 2.0}, "friction must be between 0.5 and 1.5"),
+        ({"randomise": 0.6}, "randomise"),
+        ({"position": [0.1, 0.0]}, "position"),
+        ({"yaw": "left"}, "yaw"),
+    ],
+)
+def test_bad_options_are_named(shared, options, message):
+    with pytest.raises(ValueError, match=message):
+        shared.reset(seed=0, options=options)
+
+
+def test_bad_arguments_and_actions_are_named(shared):
+    for wrong in ({"camera": "top"}, {"tca_period": 0.03}, {"render_mode": "human"}):
+        with pytest.raises(ValueError, match=next(iter(wrong))):
+            TetrapodCourse(**wrong)
+    shared.reset(seed=0)
+    for action in (OFF[:-1], 2.0 * OFF, np.full(ACTION.size, np.nan)):
+        with pytest.raises(ValueError, match="action"):
+            shared.step(action)
+
+
+def test_friction_is_drawn_and_forgotten(shared):
+    foot = shared.model.geom("robot.front_left.foot").id
+    drawn = []
+    for seed in range(6):
+        _, info = shared.reset(seed=seed, options={"randomise": 0.2})
+        drawn.append(info["friction"])
+        assert shared.model.geom_friction[foot, 0] == pytest.approx(
+            info["friction"] * shared.robot.leg.friction
+        )
+    assert 0.8 <= min(drawn) < 0.95 and 1.05 < max(drawn) <= 1.2
+    shared.reset(seed=0)
+    assert shared.model.geom_friction[foot, 0] == shared.robot.leg.friction
+
+
+def test_touching_the_plate_is_seen_and_spoils_success(shared):
+    shared.reset(seed=0)
+    bent(shared, np.radians(95.0), 0.09, 0.075)  # as tall as it walks, where the plate is
+    *_, info = shared.step(OFF)
+    assert info["touched_plate"] and info["reward_terms"]["touch"] == -0.1
+    bent(shared, np.radians(20.0), shared.places.target, 0.01)
+    _, _, terminated, _, info = shared.step(OFF)
+    assert terminated and not info["success"]
+    shared.reset(seed=0)
+    assert not shared.touched
+
+
+def test_lying_flat_and_cold_on_the_target_is_the_finish(shared):
+    shared.reset(seed=0)
+    bent(shared, np.radians(20.0), shared.places.target, 0.01)
+    _, reward, terminated, truncated, info = shared.step(OFF)
+    assert terminated and not truncated and info["success"]
+    assert info["reward_terms"]["finish"] == 20.0
+    shared.reset(seed=0)
+    bent(shared, np.radians(95.0), shared.places.target, 0.08)  # there, but standing
+    _, _, terminated, _, info = shared.step(OFF)
+    assert not terminated and not info["success"]
+
+
+def test_a_fall_into_the_gap_ends_the_episode(shared):
+    shared.reset(seed=0)
+    bent(shared, np.radians(20.0), 0.5 * (shared.places.first_edge + shared.places.second_edge), -0.2)
+    _, _, terminated, _, info = shared.step(OFF)
+    assert terminated and info["termination_reason"] == "fallen" and not info["success"]
+
+
+def test_a_tca_that_contracts_against_a_stiff_spine_is_harmed(shared):
+    shared.reset(seed=0)
+    action = OFF.copy()
+    action[12:15] = 1.0  # the spines' TCAs at full power, the spines cold
+    *_, info = shared.step(action)
+    assert info["damaged"].all() and info["reward_terms"]["damage"] == -15.0
+    *_, info = shared.step(action)
+    assert info["damaged"].all() and info["reward_terms"]["damage"] == 0.0  # once is enough
+    bent(shared, np.radians(20.0), shared.places.target, 0.01)
+    shared.sim.spines.damaged[:] = True
+    *_, info = shared.step(OFF)
+    assert info["reward_terms"]["finish"] == 20.0 and not info["success"]
+
+
+def test_the_course_file_and_the_plan_agree(shared):
+    places = shared.places
+    assert places.first_edge < places.second_edge < places.beam_end < places.target
+    plan = stages(places)
+    assert [stage.name for stage in plan][:5] == ["crawl", "stand up", "walk", "mount", "clamp"]
+    ends = [stage.until for stage in plan if isinstance(stage, Go)]
+    assert ends == sorted(ends)
+    assert isinstance(plan[-1], Bend) and plan[-1].angle is None
+    limit = TetrapodCourse.max_temperature
+    for gait in (CRAWL, WALK, SHIMMY, REACH):
+        assert gait.temperature(np.linspace(0.0, 1.0, 101)).max() < limit
+
+
+def test_the_crawl_goes_forward_and_the_walk_is_faster():
+    """A few cycles of each; over the whole course the demo prints the speeds."""
+    speeds = {}
+    for gait, angle, z in (("crawl", 20.0, 0.013), ("walk", 95.0, 0.075)):
+        env = TetrapodCourse()
+        env.reset(seed=0)
+        bent(env, np.radians(angle), 0.0 if gait == "crawl" else 0.25, z)
+        walker = CourseWalker(env)
+        walker._number = [stage.name for stage in stages(env.places)].index(gait)
+        observation = env._observe()
+        for step in range(120):
+            observation, *_ = env.step(walker.act(observation))
+            if step == 59:
+                start = env.position[0]
+        speeds[gait] = (env.position[0] - start) / 6.0
+        assert walker.phase == gait
+        assert env.sim.temperature.max() < 175.0 and env.sim.tension.max() < 0.78
+    assert 0.5 * 2.4e-3 < speeds["crawl"] < 2.0 * 2.4e-3
+    assert 0.5 * 9e-3 < speeds["walk"] < 2.0 * 9e-3
+
+
+def test_the_demo_writes_what_happened(tmp_path):
+    result = tetrapod_course(seed=1, out=tmp_path, max_duration=0.5, video=False, progress=False)
+    assert result["ending"] == "stopped after 0.5 s" and not result["success"]
+    assert (tmp_path / "summary.json").is_file() and (tmp_path / "rollout.rrd").is_file()
+    assert [row["name"] for row in result["speeds"]] == ["crawl"]
+    assert result["speeds"][0]["published"] == 2.4e-3
+    assert "| crawl |" in speed_table(result) and "2.40 mm/s" in speed_table(result)
+    assert "is not on its target" in outcome(result)
+    assert result["touched_plate"] is False and result["damaged"] is False
