@@ -1,0 +1,80 @@
+"""The scripted policy of ``TCA/MorphModule-v0``: Sun's sequence, by the TCA's own resistance."""
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tca_mj.control.morph import ClosedLoop, Measurement, MorphSequence, MorphState
+from tca_mj.control.pi import PiSpec
+from tca_mj.envs.morph import ACTION, OBSERVATION, MorphModule
+from tca_mj.modules.morphing import MorphingSpec
+from tca_mj.smp.lumped import LumpedModule
+from tca_mj.tca.sensing import DisplacementFit, fit_displacement
+
+# Gains of the angle's controller, tuned on the hanging module: the gain keeps away from the 2 Hz
+# at which the soft module swings, the integral follows what the hot TCA loses in 3 s.
+GAINS = PiSpec(proportional=40.0, integral=15.0, highest=MorphModule.max_power)
+
+
+def calibrate(spec: MorphingSpec, largest: float = math.radians(260.0)) -> DisplacementFit:
+    """Third-order polynomial from the TCA's resistance to the angle, fitted to the model.
+
+    Sun, Section 6.2.2, fits it to measurements.
+
+    Args:
+        spec: The module.
+        largest: Largest angle of the fit [rad].
+    """
+    module = LumpedModule(spec.spine, spec.heater, spec.sheathed)
+    angles, cold = np.linspace(0.0, largest, 27), module.bank.rest()
+    lengths = [module.tca_length(np.full(1, angle)) for angle in angles]
+    ohms = [float(module.bank.resistance(cold, length)[0]) for length in lengths]
+    return fit_displacement(ohms, angles)
+
+
+@dataclass(slots=True)
+class MorphPolicy:
+    """Soften, morph, hold, harden, release: an observation in, an action out.
+
+    It looks at the thermistor, the TCA's resistance and the commanded angle, and at nothing else
+    of the observation.
+
+    Attributes:
+        module_spec: The module it was told that it has.
+        gains: PI gains from the error of the angle [rad] to the TCA's power [W].
+        sequence: The phases.
+        progress: Where it stands; None before the first observation.
+    """
+
+    module_spec: MorphingSpec = field(default_factory=MorphingSpec)
+    gains: PiSpec = GAINS
+    sequence: MorphSequence = field(init=False)
+    progress: MorphState | None = None
+    _fit: DisplacementFit = field(init=False)
+
+    def __post_init__(self) -> None:
+        self._fit = calibrate(self.module_spec)
+        self.sequence = MorphSequence(drive=ClosedLoop(pi=self.gains, angle_of=self.angle_of))
+
+    def angle_of(self, resistance: float) -> float:
+        """Angle [rad] that a resistance [ohm] tells."""
+        return float(self._fit.displacement(resistance))
+
+    def reset(self) -> None:
+        """Starts anew."""
+        self.progress = None
+
+    def act(self, observation: NDArray[np.float32]) -> NDArray[np.float32]:
+        """The action for the next control period, shape (3,)."""
+        rows = OBSERVATION.read(observation.astype(np.float64))
+        if self.progress is None:
+            self.progress = self.sequence.start(float(rows["commanded angle"][0]))
+        seen = Measurement(float(rows["spine temperature"][0]), float(rows["TCA resistance"][0]))
+        self.progress, command = self.sequence.step(self.progress, seen, MorphModule.control_period)
+        action = np.empty(ACTION.size, dtype=np.float32)
+        action[0] = 2.0 * command.heater_voltage / MorphModule.max_voltage - 1.0
+        action[1] = 2.0 * command.tca_power / MorphModule.max_power - 1.0
+        action[2] = 1.0 if command.fan else -1.0
+        return action

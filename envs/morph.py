@@ -1,0 +1,382 @@
+"""``TCA/MorphModule-v0``: a module bends itself to an angle and keeps it (Sun, Section 6.1)."""
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import gymnasium as gym
+import mujoco
+import numpy as np
+from dm_control.utils import rewards
+from numpy.typing import NDArray
+
+from tca_mj.assets import mjcf
+from tca_mj.envs.table import Entry, Table, numbers
+from tca_mj.model.part import Part, new_spec
+from tca_mj.model.scene import scene
+from tca_mj.modules.morphing import MorphingSpec, morphing_module
+from tca_mj.render import Offscreen, colour_tendons
+from tca_mj.sim import Simulation, SimulationDiverged
+
+Observation = NDArray[np.float32]
+Action = NDArray[np.float32]
+
+CAMERAS = ("front", "side")
+
+OBSERVATION = Table(
+    [
+        Entry("spine temperature", 1, -50.0, 400.0, "°C"),
+        Entry("TCA temperature", 1, -50.0, 300.0, "°C"),
+        Entry("TCA length", 1, 0.1, 0.5, "m"),
+        Entry("TCA resistance", 1, 0.0, 40.0, "ohm"),
+        Entry("TCA tension", 1, 0.0, 5.0, "N"),
+        Entry("angle", 1, -7.0, 7.0, "rad"),
+        Entry("angular velocity", 1, -200.0, 200.0, "rad/s"),
+        Entry("commanded angle", 1, 0.0, 4.0, "rad"),
+        Entry("time at the goal", 1, 0.0, 3.0, "s"),
+    ]
+)
+ACTION = Table(
+    [
+        Entry("heater voltage", 1, -1.0, 1.0, "-"),
+        Entry("TCA power", 1, -1.0, 1.0, "-"),
+        Entry("fan", 1, -1.0, 1.0, "on above 0"),
+    ]
+)
+
+_CLAMP = (-0.03, 0.0, 0.162)  # where the module hangs [m]
+# z of the module down, its TCA towards x of the world, wxyz.
+_HANGING = (0.0, math.sqrt(0.5), -math.sqrt(0.5), 0.0)
+_COLD, _HOT = np.array([0.86, 0.74, 0.48]), np.array([0.90, 0.25, 0.12])  # of the spine
+_APART = math.radians(20.0)  # least distance of a drawn start from the goal [rad]
+
+
+class MorphModule(gym.Env[Observation, Action]):
+    """Bend a module with a shape-memory spine to an angle, so that it stays there unpowered.
+
+    The module hangs from a clamp and bends in a vertical plane. Heated, its spine is soft, its
+    weight pulls it straight and its TCA bends it; cold, the spine is rigid. To contract the TCA
+    against a stiff spine damages it.
+
+    Action, shape (3,), all in [-1, 1]:
+        0: voltage of the heater; -1 is off, 1 is ``max_voltage``, linear in between.
+        1: power of the TCA; -1 is off, 1 is ``max_power``, linear in between.
+        2: fan; it blows above 0.
+
+    Observation, shape (9,): see ``OBSERVATION``, whose rows have units and bounds. The angle is
+    that by which the module is bent from base to tip, positive towards the TCA.
+
+    Reward, the sum of the terms in ``info["reward_terms"]``. The first two pay for progress and
+    take it back:
+        reach: Change of a measure from 0 to 1 of how close the angle is to the commanded one.
+        fix: Change of a measure from 0 to 4 of how close the angle is that the spine would have
+            without load: the memorised one while it is soft, the present one while it hardens.
+        goal: 20 in the step in which the module has been at the goal for 3 s.
+        energy: Minus 0.01 per joule of electrical energy of heater and TCA.
+        damage: Minus 10 in the step in which the TCA is damaged.
+
+    At the goal the module is within 3° of the commanded angle, its spine is rigid (below 80 °C),
+    and heater, TCA and fan are off.
+
+    Reset: cold and fixed in some angle, to be fixed in another one. Options:
+        start: Angle at the start, in ``start_range`` [rad].
+        target: Angle to fix, in ``target_range`` [rad].
+
+    Terminates at the goal (success). Truncates after the time limit, and with
+    ``info["truncation_reason"]`` if the TCA is damaged, too hot or torn, the spine too hot, or if
+    the simulation diverged.
+    """
+
+    metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 10}
+    max_voltage = 25.0  # Sun, Section 6.1.3 [V]
+    max_power = 40.0  # about 25 V at the TCA, Sun, Section 6.2.1 [W]
+    max_temperature = 180.0  # annealing temperature of the TCA, Sun, Table 2.1 [°C]
+    max_spine_temperature = 160.0  # an estimate, as in ``MorphSequence`` [°C]
+    control_period = 0.1  # [s]
+    tolerance = math.radians(3.0)  # Sun, Section 6.2.1, calls this steady [rad]
+    hold_time = 3.0  # time at the goal [s]
+    start_range = (0.0, math.pi)
+    target_range = (math.radians(30.0), math.pi)
+
+    def __init__(
+        self,
+        *,
+        render_mode: str | None = None,
+        module_spec: MorphingSpec | None = None,
+        timestep: float = 5e-3,
+        camera: str = "front",
+        size: tuple[int, int] = (960, 720),
+    ) -> None:
+        """Builds the scene.
+
+        Args:
+            render_mode: None or ``"rgb_array"``.
+            module_spec: The module, by default the published one, bending in its plane only.
+            timestep: Physics time step, a whole fraction of ``control_period``, in which the TCA
+                and the spine are updated once [s].
+            camera: Camera of the pictures: ``front`` or ``side``.
+            size: Width and height of the pictures [pixels].
+
+        Raises:
+            ValueError: If an argument is out of range or the module cannot be built.
+        """
+        if render_mode not in (None, *self.metadata["render_modes"]):
+            raise ValueError(
+                f"render_mode must be None or one of {self.metadata['render_modes']},"
+                f" got {render_mode!r}"
+            )
+        if camera not in CAMERAS:
+            raise ValueError(f"camera must be one of {CAMERAS}, got {camera!r}")
+        pixels = numbers("size", size, (2,))
+        if pixels.min() < 1.0:
+            raise ValueError(f"size must be at least 1 pixel each way, got {size}")
+        steps = self.control_period / timestep if timestep > 0.0 else 0.0
+        if not (np.isfinite(steps) and steps > 0.5 and abs(steps - round(steps)) < 1e-9):
+            raise ValueError(
+                f"timestep must be {self.control_period} s over a whole number, got {timestep}"
+            )
+        self.render_mode: str | None = render_mode
+        self.module_spec = module_spec or MorphingSpec(motions=("bend_x",))
+        part = hanging_module(self.module_spec)
+        self.sim = Simulation(part, timestep=timestep, tca_period=self.control_period)
+        self.observation_space = OBSERVATION.space
+        self.action_space = ACTION.space
+        self._camera, self._size = camera, size
+        self._screen: Offscreen | None = None
+        self.target = self.target_range[1]
+        self._at_goal = 0
+        self._find(self.model, part)
+        self._progress = self._judge()
+
+    def _find(self, model: mujoco.MjModel, part: Part) -> None:
+        """Looks up the addresses of what is observed and set."""
+        names = [name for name, _ in part.spines[0].joints]
+        self._bends = np.array([i for i, name in enumerate(names) if ".bend_x" in name])
+        joints = [model.joint(names[i]).id for i in self._bends]
+        self._bend_q, self._bend_v = model.jnt_qposadr[joints], model.jnt_dofadr[joints]
+        geoms = [model.geom(i).name for i in range(model.ngeom)]
+        self._polymer = np.flatnonzero([".polymer" in name for name in geoms])
+
+    # What tools that know Gymnasium's own MuJoCo environments look for.
+    @property
+    def model(self) -> mujoco.MjModel:
+        """The compiled model."""
+        return self.sim.model
+
+    @property
+    def data(self) -> mujoco.MjData:
+        """MuJoCo's state."""
+        return self.sim.data
+
+    @property
+    def dt(self) -> float:
+        """Time of one step [s]."""
+        return self.control_period
+
+    @property
+    def angle(self) -> float:
+        """Angle by which the module is bent, positive towards its TCA [rad]."""
+        return float(np.sum(self.data.qpos[self._bend_q]))
+
+    @property
+    def fixed_angle(self) -> float:
+        """Angle that the spine would have at its present temperature without load [rad]."""
+        spines = self.sim.spines
+        assert spines.state is not None
+        return float(np.sum(spines.bank.spring(spines.state).reference[self._bends]))
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Observation, dict[str, Any]]:
+        """Starts an episode; see the class for the options.
+
+        Raises:
+            ValueError: If an option is unknown or out of its range.
+        """
+        super().reset(seed=seed)
+        setup = self._setup(options or {})
+        self.target = setup["target"]
+
+        def place(data: mujoco.MjData) -> None:
+            data.qpos[self._bend_q] = setup["start"] / len(self._bend_q)
+
+        self.sim.reset(place)
+        self._at_goal = 0
+        self._progress = self._judge()
+        return self._observe(), self._info()
+
+    def _setup(self, options: Mapping[str, Any]) -> dict[str, float]:
+        """Draws what the options leave open. All draws are made, so that options shift none."""
+        ranges = {"target": self.target_range, "start": self.start_range}
+        unknown = [key for key in options if key not in ranges]
+        if unknown:
+            raise ValueError(f"options must be some of {sorted(ranges)}, got {unknown}")
+        setup = {"target": float(self.np_random.uniform(*self.target_range))}
+        share = self.np_random.random()
+        for key, (low, high) in ranges.items():
+            if key not in options:
+                continue
+            value = float(numbers(key, options[key], ()))
+            if not low <= value <= high:
+                raise ValueError(f"{key} must be between {low:.4f} and {high:.4f} rad, got {value}")
+            setup[key] = value
+        if "start" not in setup:  # anywhere but near the goal
+            low, high = self.start_range
+            below = max(setup["target"] - _APART - low, 0.0)
+            above = max(high - setup["target"] - _APART, 0.0)
+            along = share * (below + above)
+            setup["start"] = low + along if along < below else high - (below + above - along)
+        return setup
+
+    def step(self, action: Action) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
+        """Heats and cools for ``control_period``; see the class.
+
+        Raises:
+            ValueError: If the action has the wrong shape, is not finite or out of [-1, 1].
+        """
+        command = numbers("action", action, (ACTION.size,))
+        if np.abs(command).max() > 1.0 + 1e-6:
+            raise ValueError(f"action must be within -1 and 1, got {command}")
+        share = (np.clip(command, -1.0, 1.0) + 1.0) / 2.0
+        voltage, power = self.max_voltage * share[0], self.max_power * share[1]
+        fan = bool(command[2] > 0.0)
+        used = self._energy()
+        reason = None
+        try:
+            self.sim.step(power[None], self.control_period, voltage=voltage, fan=fan)
+        except SimulationDiverged as error:
+            reason = f"diverged: {error}"
+        off = voltage == 0.0 and power == 0.0 and not fan
+        before = self._progress
+        if reason is None:  # nothing is known of a diverged state
+            self._progress = self._judge()
+        self._at_goal = self._at_goal + 1 if off and reason is None and self._fixed() else 0
+        observation = self._observe()
+        outside = OBSERVATION.outside(observation)
+        if outside:
+            reason = reason or f"diverged: {', '.join(outside)} out of bounds"
+            observation = OBSERVATION.bounded(observation)
+        reason = reason or self._harm()
+        success = self._at_goal * self.control_period > self.hold_time - 1e-9 and reason is None
+        terms = {name: value - before[name] for name, value in self._progress.items()}
+        terms["goal"] = 20.0 if success else 0.0
+        terms["energy"] = -0.01 * (self._energy() - used)
+        terms["damage"] = -10.0 if reason is not None and reason.startswith("damaged") else 0.0
+        info = {"reward_terms": terms, "success": success, **self._info()}
+        if reason is not None:
+            info["truncation_reason"] = reason
+        return observation, float(sum(terms.values())), success, reason is not None, info
+
+    def _energy(self) -> float:
+        """Electrical energy put into heater and TCA [J]."""
+        return float(self.sim.energy.sum() + self.sim.spines.energy.sum())
+
+    def _fixed(self) -> bool:
+        """Whether the angle is the commanded one and the spine rigid."""
+        rigid = self.sim.spines.temperature[0] < self.module_spec.spine.smp.rigid_below
+        return bool(rigid and abs(self.angle - self.target) <= self.tolerance)
+
+    def _judge(self) -> dict[str, float]:
+        """How far the task has got, by reward term."""
+
+        def near(angle: float) -> float:
+            return float(
+                rewards.tolerance(
+                    abs(angle - self.target), bounds=(0.0, math.radians(1.0)), margin=math.pi,
+                    sigmoid="linear", value_at_margin=0.0,
+                )
+            )  # fmt: skip
+
+        self._keeps = self.fixed_angle
+        return {"reach": near(self.angle), "fix": 4.0 * near(self._keeps)}
+
+    def _observe(self) -> Observation:
+        sim = self.sim
+        length = sim.length
+        try:
+            resistance = sim.bank.resistance(sim.tca, length)
+        except ValueError:  # a diverged TCA has a length that no TCA can have
+            resistance = np.full(1, np.nan)
+        return OBSERVATION.pack(
+            {
+                "spine temperature": sim.spines.temperature,
+                "TCA temperature": sim.temperature,
+                "TCA length": length,
+                "TCA resistance": resistance,
+                "TCA tension": sim.tension,
+                "angle": self.angle,
+                "angular velocity": float(np.sum(self.data.qvel[self._bend_v])),
+                "commanded angle": self.target,
+                "time at the goal": min(self._at_goal * self.control_period, self.hold_time),
+            }
+        )
+
+    def _harm(self) -> str | None:
+        """What the module does not survive, or None."""
+        sim = self.sim
+        if sim.spines.damaged.any():
+            return "damaged: the TCA contracted against a stiff spine"
+        if sim.spines.temperature[0] > self.max_spine_temperature:
+            return f"overheated: spine above {self.max_spine_temperature} °C"
+        if sim.temperature[0] > self.max_temperature:
+            return f"overheated: TCA above {self.max_temperature} °C"
+        if sim.tension[0] > sim.bank.breaking_force[0]:
+            return f"torn: TCA above {sim.bank.breaking_force[0]} N"
+        return None
+
+    def _info(self) -> dict[str, Any]:
+        sim = self.sim
+        return {
+            "target": self.target,
+            "angle": self.angle,
+            "fixed_angle": self._keeps,
+            "time": sim.time,
+            "energy": sim.energy.copy(),
+            "heater_energy": sim.spines.energy.copy(),
+            "temperature": sim.temperature.copy(),
+            "spine_temperature": sim.spines.temperature.copy(),
+            "tension": sim.tension.copy(),
+            "damaged": bool(sim.spines.damaged.any()),
+        }
+
+    def render(self) -> NDArray[np.uint8] | None:
+        """A picture of the scene, shape (height, width, 3), or None without a render mode.
+
+        Raises:
+            RenderingUnavailable: If there is no OpenGL.
+        """
+        if self.render_mode is None:
+            return None
+        if self._screen is None:
+            width, height = self._size
+            self._screen = Offscreen(
+                self.model, width=width, height=height, camera=f"stand.{self._camera}"
+            )
+        self.paint()
+        return self._screen.draw(self.data)
+
+    def paint(self) -> None:
+        """Gives TCA and spine the colours of their temperatures; no physics reads them."""
+        model, sim = self.model, self.sim
+        colour_tendons(model, sim.tendon, sim.temperature)
+        heat = np.clip((sim.spines.temperature[0] - 25.0) / 95.0, 0.0, 1.0)
+        model.geom_rgba[self._polymer, :3] = _COLD + heat * (_HOT - _COLD)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Everything but the window: a copy goes on where this one is."""
+        return self.__dict__ | {"_screen": None}
+
+    def close(self) -> None:
+        """Frees what rendering took."""
+        if self._screen is not None:
+            self._screen.close()
+            self._screen = None
+
+
+def hanging_module(spec: MorphingSpec) -> Part:
+    """The scene: the module, named ``module``, hangs from a stand and bends in the x-z plane."""
+    mjspec = new_spec("morph")
+    mjspec.worldbody.add_site(name="clamp", pos=list(_CLAMP), quat=list(_HANGING), group=4)
+    robot = Part(mjspec)
+    robot.attach(morphing_module(spec), to="clamp", prefix="module")
+    return scene(mjcf("arena.xml"), robot, {"stand": mjcf("morph_stand.xml")}, name="bench")

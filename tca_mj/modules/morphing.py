@@ -1,0 +1,175 @@
+"""The bending morphing module: a shape-memory spine and a U-shaped TCA (Sun, Section 6.1).
+
+Hot, the spine is soft and the TCA bends it; cold, it is rigid and keeps its shape without power.
+The section's y axis lies in the plane of bending, x across it. The TCA runs on the side of -y, so
+that a positive angle of ``bend_x`` bends the module towards its TCA.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import mujoco
+
+from tca_mj.model.chain import Chain, Motion, beam
+from tca_mj.model.part import Part, new_spec
+from tca_mj.model.spine import route_spine
+from tca_mj.model.tendon import route_passes, route_tca
+from tca_mj.rod.beam import BeamSpec, Outline, require_count, require_positive
+from tca_mj.routes import UTurn
+from tca_mj.smp import HeaterSpec, SpineSpec
+from tca_mj.smp.lumped import TUBE_DIAMETER, sheathed
+from tca_mj.tca import CATALOGUE, TcaSpec
+
+# Stiffness of what is round the spine (tube, wires) over that of the soft spine. Estimate: the
+# silicone of the tube, 0.1 MPa, has 0.002 of the soft spine's bending stiffness.
+_SHEATH = 2e-3
+_PROTRUSIONS = 6  # pairs that hold the tube; Sun, Fig. 6.1, shows them, the number is an estimate
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class MorphingSpec:
+    """A bending morphing module.
+
+    Attributes:
+        spine: Spine, and where the TCA runs.
+        heater: Heater wire, fitted to the module's natural cooling.
+        tca: The kind of TCA, cut to twice the spine's length.
+        tube_capacity: Heat capacity of what of the tube is heated with the TCA [J/K]. Estimate: a
+            sixth of the tube; with it 240° take about the reported second.
+        mass: Mass of spine, protrusions, tube and wires, without the TCA [kg]. Estimate: 2.2 g of
+            epoxy, 1 g of silicone, 0.3 g of wire.
+        half_width: Half the distance between the two legs of the U [m]. Estimate.
+        tip_mass: Mass of a weight fixed to the tip [kg].
+        damping_time: Kelvin-Voigt time of the spine [s]. Estimate: a loss factor of 0.2 at the
+            2 Hz at which the soft module swings.
+        motions: Motions of each node. The axis hardly stretches: at 240° the TCA would be 8 %
+            shorter than the bend alone makes it.
+        nodes: Nodes of the chain.
+
+    Raises:
+        ValueError: If a number is out of range.
+    """
+
+    spine: SpineSpec = field(default_factory=SpineSpec)
+    heater: HeaterSpec = field(default_factory=lambda: HeaterSpec.fitted(SpineSpec()))
+    tca: TcaSpec = field(default_factory=lambda: CATALOGUE["free-stroke"])
+    tube_capacity: float = 0.12
+    mass: float = 3.5e-3
+    half_width: float = 1.6e-3
+    tip_mass: float = 0.0
+    damping_time: float = 20e-3
+    motions: tuple[Motion, ...] = ("bend_x", "bend_y", "twist")
+    nodes: int = 10
+
+    def __post_init__(self) -> None:
+        require_positive(mass=self.mass, half_width=self.half_width, damping_time=self.damping_time)
+        require_count(nodes=self.nodes)
+        for name in ("tube_capacity", "tip_mass"):
+            if not 0.0 <= getattr(self, name) < math.inf:
+                raise ValueError(f"{name} must be finite and at least 0, got {getattr(self, name)}")
+        if "bend_x" not in self.motions:
+            raise ValueError(f"motions must contain 'bend_x', got {self.motions}")
+
+    @property
+    def body(self) -> BeamSpec:
+        """What the chain has besides the shape-memory spine."""
+        spine, size = self.spine, self.spine.tca_offset + TUBE_DIAMETER / 2.0
+        soft = _SHEATH * spine.smp.rubbery * spine.second_moment
+        return BeamSpec(
+            length=spine.length,
+            bending=(soft, soft),
+            torsion=soft,
+            stretching=soft / spine.thickness**2,
+            shearing=soft / spine.thickness**2,
+            line_density=self.mass / spine.length,
+            outline=Outline(spine.width / 2.0, size, round=False),
+        )
+
+    @property
+    def sheathed(self) -> TcaSpec:
+        """The TCA in its tube."""
+        return sheathed(self.tca, self.spine, self.tube_capacity)
+
+    @property
+    def route(self) -> UTurn:
+        """The two legs of the TCA, on the side of -y."""
+        return UTurn.parallel(self.spine.tca_offset, self.half_width, -math.pi / 2.0)
+
+
+def morphing_module(spec: MorphingSpec | None = None) -> Part:
+    """Builds the module: clamped at the origin, straight along z, memorised straight.
+
+    Returns:
+        A part with the TCA ``tca``, the spine ``spine``, the site ``tip`` and the body ``tip``
+        at the same place: an external force on it acts on the end of the spine's axis.
+
+    Raises:
+        ValueError: If the geometry cannot be built.
+    """
+    spec = spec or MorphingSpec()
+    mjspec = new_spec("morphing")
+    chain = beam(
+        mjspec.worldbody, spec.body, nodes=spec.nodes, name="spine", motions=spec.motions,
+        rgba=(0.0, 0.0, 0.0, 0.0), collide=False,
+    )  # fmt: skip
+    _dress(chain, spec)
+    tca = route_tca(mjspec, spec.sheathed, route_passes(chain, spec.route), name="tca")
+    spine = route_spine(
+        spec.spine, spec.heater, [chain], name="spine", tca="tca", damping_time=spec.damping_time
+    )
+    end = chain.tip.add_body(name="tip", pos=[0.0, 0.0, chain.local(spec.nodes)])
+    end.ipos = [0.0, 0.0, 0.0]  # a body without mass is pushed where its centre of mass is said
+    end.add_site(name="tip", group=4)
+    if spec.tip_mass > 0.0:
+        chain.tip.add_geom(
+            name="weight", type=mujoco.mjtGeom.mjGEOM_SPHERE, size=[6e-3, 0.0, 0.0],
+            pos=[0.0, 0.0, chain.local(spec.nodes)], mass=spec.tip_mass,
+            rgba=[0.72, 0.55, 0.25, 1.0], contype=0, conaffinity=1,
+        )  # fmt: skip
+    return Part(mjspec, (tca,), {"tip": "tip"}, (spine,))
+
+
+def _dress(chain: Chain, spec: MorphingSpec) -> None:
+    """What is seen and touched: polymer, protrusions on its inner side, the two legs' tube."""
+    spine, radius = spec.spine, TUBE_DIAMETER / 2.0
+    box, cylinder = mujoco.mjtGeom.mjGEOM_BOX, mujoco.mjtGeom.mjGEOM_CYLINDER
+    polymer, silicone = (0.86, 0.72, 0.42, 1.0), (0.92, 0.93, 0.95, 0.3)
+    held = {round(chain.nodes * i / (_PROTRUSIONS - 1)) for i in range(_PROTRUSIONS)}
+    for number, piece in enumerate(chain.pieces):
+        whole = chain.piece * (0.5 if number in (0, chain.nodes) else 1.0)
+        middle = whole / 2.0
+        _geom(
+            piece, box, f"polymer{number}", (0.0, 0.0, middle),
+            (spine.width / 2.0, spine.thickness / 2.0, middle), polymer,
+        )  # fmt: skip
+        for leg, side in enumerate((-1.0, 1.0)):
+            _geom(
+                piece, cylinder, f"tube{leg}.{number}",
+                (side * spec.half_width, -spine.tca_offset, middle), (radius, middle, 0.0),
+                silicone,
+            )  # fmt: skip
+        if number in held:
+            at = {0: 1.5e-3, chain.nodes: whole - 1.5e-3}.get(number, middle)
+            for leg, side in enumerate((-1.0, 1.0)):
+                _geom(
+                    piece, box, f"protrusion{leg}.{number}",
+                    (side * (spine.width / 2.0 - 0.3e-3), -spine.tca_offset + 0.6e-3, at),
+                    (0.5e-3, radius, 1.5e-3), polymer,
+                )  # fmt: skip
+
+
+def _geom(
+    body: mujoco.MjsBody,
+    shape: mujoco.mjtGeom,
+    name: str,
+    pos: Sequence[float],
+    size: Sequence[float],
+    rgba: Sequence[float],
+) -> None:
+    """A weightless shape that touches objects and ground, but nothing of the module."""
+    body.add_geom(
+        name=name, type=shape, pos=list(pos), size=list(size), rgba=list(rgba), mass=0.0,
+        contype=0, conaffinity=1, condim=3, friction=[0.3, 0.002, 1e-4],
+        solref=[5e-3, 1.0], solimp=[0.95, 0.99, 5e-4, 0.5, 2.0],
+    )  # fmt: skip
