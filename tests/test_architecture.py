@@ -17,20 +17,23 @@ ROOT = Path(__file__).resolve().parent.parent
 MAPPED = ("envs", "agents", "assets")  # folders of the checkout that are installed in tca_mj
 
 # Bottom to top; a layer imports itself and what stands before it.
-LAYERS = "routes rod tca control model sim record modules robots envs agents".split()
+LAYERS = "routes rod tca smp control model sim record modules robots envs agents".split()
 # The same with what surrounds it: the door (__init__ and registry, which every import of the
 # package runs) and the static files below, the command line above.
 STACK = ["door", "assets", *LAYERS, "cli"]
-# Files directly in tca_mj that do not have the name of their layer.
+# Files and folders directly in tca_mj that do not have the name of their layer.
 LAYER_OF = {
     "__init__": "door",
     "registry": "door",
     "machine": "door",
     "bench": "agents",
+    "validation": "agents",
+    "certify": "agents",
     "plots": "control",
     "render": "record",
     "film": "record",
     "shapes": "record",
+    "variation": "sim",
 }
 # Files that only high layers may import, although they themselves see only what is low:
 # figures and recordings share colours, and no physics draws.
@@ -50,8 +53,8 @@ LOWEST = {
     "torch": "agents",
     "tqdm": "agents",
 }
-# Third-party packages that belong to single files instead: where, and nowhere else.
-ONLY_IN = {"matplotlib": {"plots"}}
+# Third-party packages that belong to single files or packages instead: where, and nowhere else.
+ONLY_IN = {"matplotlib": {"plots", "validation"}}
 # What a file may import although its layer may not.
 BESIDES = {"registry": {"gymnasium"}}
 
@@ -214,6 +217,7 @@ PLANTED = [
     *(f"tca_mj.{name}" for name in ("__init__", "registry", "routes", "sim", "record", "render")),
     *(f"tca_mj.{name}" for name in ("plots", "cli", "rod.__init__", "rod.lie", "envs.arm")),
     *(f"tca_mj.{name}" for name in ("tca.__init__", "tca.bank", "model.__init__", "agents.train")),
+    *(f"tca_mj.{name}" for name in ("validation.__init__", "validation.facts")),
 ]
 
 
@@ -232,6 +236,7 @@ PLANTED = [
         ("tca_mj.record", "import gymnasium as gym", "not for layers below envs"),
         ("tca_mj.sim", "from tca_mj.plots import curve", "serves record and above"),
         ("tca_mj.record", "import matplotlib.pyplot as plt", "belongs to"),
+        ("tca_mj.tca.bank", "from tca_mj.validation import facts", "stands above it"),
         ("tca_mj.plots", "import mujoco", "not for layers below model"),
         ("tca_mj.plots", "from tca_mj.model import scene", "stands above it"),
         ("tca_mj.envs.arm", "import torch", "not for layers below agents"),

@@ -1,0 +1,1 @@
+"""How far the chain of every module is from the theory of rods, computed anew by one command."""
