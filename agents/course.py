@@ -11,38 +11,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from tca_mj.agents.tetrapod_gaits import CRAWL, SHIMMY, WALK
 from tca_mj.control import Gait, Thermostat
 from tca_mj.envs.course import ACTION, OBSERVATION, Places, TetrapodCourse
 
 Array = NDArray[np.float64]
 
-_TURN = (0.0, 1.0 / 3.0, 2.0 / 3.0)  # a loop of the foot: up, front, rear, one after the other
-
-CRAWL = Gait(
-    period=4.0, offset=(0.0,) * 4, start=_TURN, duty=(0.5,) * 3, hot=(165.0,) * 3, warm=(25.0,) * 3
-)
-"""All four feet run round their loops together, like the flippers of a sea turtle."""
-
-WALK = Gait(
-    period=6.0, offset=(0.75, 0.25, 0.0, 0.5), start=(0.0, 0.0, 0.5), duty=(0.25, 0.5, 0.5),
-    hot=(160.0,) * 3, warm=(60.0, 90.0, 90.0),
-)  # fmt: skip
-"""An amble: rear left, front left, rear right, front right, a quarter of a cycle apart."""
-
 PUSH = replace(WALK, offset=(0.0,) * 4)
 """The walk with both legs of a pair together, where the body does not rest on its legs."""
-
-SHIMMY = Gait(
-    period=8.0, offset=(0.0, 0.0, 0.5, 0.5), start=_TURN, duty=(0.5,) * 3, hot=(165.0,) * 3,
-    warm=(25.0,) * 3,
-)  # fmt: skip
-"""Front and rear pair clamp the beam and push by turns, like a caterpillar."""
-
-REACH = Gait(
-    period=12.0, offset=(0.0, 0.0, 0.5, 0.5), start=(0.0, 0.2, 0.44), duty=(0.42, 0.27, 0.56),
-    hot=(172.0, 172.0, 160.0), warm=(25.0, 50.0, 50.0),
-)  # fmt: skip
-"""Slow and far: the front feet reach over the edge of the desk, land, and pull."""
 
 STEP = Gait(
     period=4.0, offset=(0.0, 0.5, 0.5, 0.0), start=(0.0, 0.5, 0.5), duty=(0.5,) * 3,
@@ -50,9 +26,7 @@ STEP = Gait(
 )  # fmt: skip
 """Steps with little headway: a foot that is lifted does not hold the body down by its friction."""
 
-_OFF = (25.0, 25.0, 25.0)
-_LIFTED = (172.0, 25.0, 25.0)
-_BEHIND = (25.0, 25.0, 172.0)
+_OFF = 25.0  # temperature at which nothing is heated [°C]
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -64,66 +38,47 @@ class Go:
         gait: Whose temperatures the legs follow.
         until: Where the stage ends, along x [m].
         patience: Time after which the stage ends wherever the body is [s].
-        steers: Whether to correct the heading by weaker legs on one side.
-        leans: Warmth of the left legs' lower TCAs over the right ones', per metre that the body is
-            off to the left [K/m]. On the ground a side that stands lower draws the walking body
-            over to it. (Astride the beam the arch of the spines centres itself.)
-        front: Temperatures of the front legs in place of the gait's [°C].
-        rear: The same of the rear legs.
+        steers: Deviation of the heading up to which nothing is done; beyond it the legs of one side
+            become weaker. None: never [rad].
     """
 
     name: str
     gait: Gait
     until: float
     patience: float = math.inf
-    steers: bool = False
-    leans: float = 0.0
-    front: tuple[float, float, float] | None = None
-    rear: tuple[float, float, float] | None = None
+    steers: float | None = None
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Bend:
-    """Change the shape of the body.
+    """Change the shape of the body; legs that do not step are left cold.
 
     Attributes:
         name: Name of the stage.
         angle: Bend from rail to rail [rad]; None is the memorised shape, which needs no TCA.
         steps: Gait of the legs while the body bends, so that friction does not hold it.
-        front: Temperatures of the front legs until the spines are rigid [°C].
-        then: The same from then on [°C].
     """
 
     name: str
     angle: float | None
     steps: Gait | None = None
-    front: tuple[float, float, float] = _OFF
-    then: tuple[float, float, float] = _OFF
 
 
 def stages(places: Places) -> tuple[Go | Bend, ...]:
     """The course, stage by stage."""
-    station, edge = places.leg_station, places.second_edge
+    station = places.leg_station
     walking = np.radians(95.0)
     return (
-        Go(name="crawl", gait=CRAWL, until=places.stand, steers=True),
+        Go(name="crawl", gait=CRAWL, until=places.stand, steers=0.0),
         Bend(name="stand up", angle=walking, steps=STEP),
-        Go(name="walk", gait=WALK, until=places.first_edge - station, leans=-1500.0),
+        Go(name="walk", gait=WALK, until=places.first_edge - station, steers=0.0),
         # The front feet have left the desk, the rear ones push on.
-        Go(name="mount", gait=PUSH, until=places.first_edge + station + 0.010),
+        Go(name="mount", gait=PUSH, until=places.first_edge + station + 0.006, patience=150.0),
         Bend(name="clamp", angle=np.radians(208.0)),
-        Go(name="shimmy", gait=SHIMMY, until=edge - station - 0.025),
-        # The front legs trail, or they would run into the desk.
-        Go(
-            name="approach", gait=SHIMMY, until=edge - station - 0.002, patience=60.0,
-            front=_BEHIND,
-        ),  # fmt: skip
-        # On the beam the rails' weight keeps the soft body from opening further.
-        Bend(name="open", angle=np.radians(104.0), front=_BEHIND, then=_LIFTED),
-        Go(name="reach", gait=REACH, until=edge + 0.030, rear=_OFF),
-        # The rear legs are lifted over the edge.
-        Go(name="climb", gait=REACH, until=edge + station + 0.014, rear=_LIFTED),
-        Go(name="walk on", gait=WALK, until=places.target, leans=-1500.0),
+        # On until the rear spine has left the beam, too; the front legs stand on the desk by then.
+        Go(name="shimmy", gait=SHIMMY, until=places.beam_end + station - 0.016, patience=320.0),
+        Bend(name="open", angle=walking, steps=STEP),
+        Go(name="walk on", gait=WALK, until=places.target, steers=0.0),
         Bend(name="lie down", angle=None),
     )
 
@@ -169,7 +124,7 @@ class CourseWalker:
         if self._number < len(self._plan) and self._over(seen):
             self._number += 1
             self._enter()
-        legs, spines, voltage = np.full((4, 3), 25.0), 25.0, np.zeros(3)
+        legs, spines, voltage = np.full((4, 3), _OFF), _OFF, np.zeros(3)
         if self._number < len(self._plan):
             stage = self._plan[self._number]
             if isinstance(stage, Go):
@@ -190,19 +145,13 @@ class CourseWalker:
 
     def _walk(self, stage: Go, seen: dict[str, Array]) -> Array:
         legs = stage.gait.temperature(self._time / stage.gait.period).reshape(4, 3)
-        if stage.steers:
+        if stage.steers is not None:
             w, _, _, z = seen["orientation"]
             away = 2.0 * np.arctan2(z, w) + 3.0 * seen["position"][1]
+            away -= np.clip(away, -stage.steers, stage.steers)
             weaker = np.clip(600.0 * away, -80.0, 80.0)
             legs[[0, 2]] -= max(-weaker, 0.0)
             legs[[1, 3]] -= max(weaker, 0.0)
-        warmer = np.clip(stage.leans * seen["position"][1], -60.0, 60.0)
-        legs[[0, 2], 1:] += warmer
-        legs[[1, 3], 1:] -= warmer
-        if stage.front is not None:
-            legs[:2] = stage.front
-        if stage.rear is not None:
-            legs[2:] = stage.rear
         return legs
 
     def _bend(self, stage: Bend, seen: dict[str, Array]) -> tuple[Array, float, Array]:
@@ -247,8 +196,7 @@ class CourseWalker:
             self._target = 25.0
             if self._time > 10.0:
                 self._go_on("done")
-        legs = np.tile(_OFF, (4, 1))
-        legs[:2] = stage.then if self._part == "release" else stage.front
+        legs = np.full((4, 3), _OFF)
         if stepping and stage.steps is not None:
             legs = stage.steps.temperature(self._time / stage.steps.period).reshape(4, 3)
         return legs, self._target, voltage

@@ -9,16 +9,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tca_mj.assets import mjcf
+from tca_mj.envs.stance import CAMERAS as FOLLOWING
+from tca_mj.envs.stance import tetrapod_scene
 from tca_mj.envs.table import Entry, Table, numbers
-from tca_mj.model.scene import scene
 from tca_mj.render import Offscreen, colour_tendons
-from tca_mj.robots.tetrapod import LEGS, SPINES, TetrapodSpec, tetrapod
-from tca_mj.sim import Simulation, SimulationDiverged
+from tca_mj.robots.tetrapod import LEGS, SPINES, TetrapodSpec
+from tca_mj.sim import SimulationDiverged
+from tca_mj.smp import HeaterSpec, SpineSpec
 
 Observation = NDArray[np.float32]
 Action = NDArray[np.float32]
 
-CAMERAS = ("follow", "side", "front")
+CAMERAS = (*FOLLOWING, "overview")
 TCAS = 3 * len(LEGS) + SPINES
 
 OBSERVATION = Table(
@@ -41,9 +43,15 @@ ACTION = Table(
     ]
 )
 
+# The module's 6.5 mm (Sun, Section 6.1.1) read as its extent in the plane of bending, its 5 mm as
+# the width: with its TCA 4 mm from the axis the body can lift itself off the desk, with 2.5 mm, as
+# in ``SpineSpec()``, it stops at 33° to 57°. The section is as stiff as that one's. Estimate.
+LIFTING_SPINE = SpineSpec(width=5e-3, thickness=2.75e-3, module_height=6.5e-3, tca_offset=4e-3)
+
 _START = 13e-3  # height of the flat robot's middle over the desk [m]
 _TURNED = np.cos(np.radians(60.0))  # the body's z axis may not lean further
 _FLAT = np.radians(40.0)  # body angle up to which the robot lies flat
+_LOST = -0.08  # height of the middle at which the robot has dropped into the gap [m]
 _COLD = 80.0  # temperature up to which a spine is rigid, Sun, Section 6.1.3 [°C]
 
 
@@ -55,7 +63,7 @@ class Places:
         stand: Where the whole robot is beyond the plate, with a hand's breadth to spare.
         first_edge: End of the first desk.
         second_edge: Start of the second desk.
-        beam_end: End of the beam.
+        beam_end: End of the beam, over the second desk.
         target: Middle of the target.
         target_size: Half sizes of the target along x and y.
         leg_station: Fore-aft distance of the legs' roots from the robot's middle.
@@ -74,8 +82,7 @@ class TetrapodCourse(gym.Env[Observation, Action]):
     """The whole course with one robot that changes its shape on the way.
 
     Crawl under a plate 30 mm above the desk, stand up, walk astride a beam until it bridges the
-    gap to the next desk, clamp it, shimmy across, climb onto the desk, walk to the target, lie
-    down flat.
+    gap to the next desk, clamp it, shimmy across, step off, walk to the target, lie down flat.
 
     Action, shape (18,), all in [-1, 1]; -1 is off, 1 the largest value, linear in between:
         0-11: power of the legs' TCAs, three of each leg: front left, front right, rear left, rear
@@ -124,10 +131,10 @@ class TetrapodCourse(gym.Env[Observation, Action]):
 
         Args:
             render_mode: None or ``"rgb_array"``.
-            robot: The robot, by default the published one.
+            robot: The robot, by default one with ``LIFTING_SPINE``.
             timestep: Physics time step [s].
             tca_period: Time between two updates of the TCAs, a multiple of ``timestep`` [s].
-            camera: Camera of the pictures: ``follow``, ``side`` or ``front``.
+            camera: Camera of the pictures: ``follow``, ``side``, ``front`` or ``overview``.
             size: Width and height of the pictures [pixels].
 
         Raises:
@@ -149,9 +156,12 @@ class TetrapodCourse(gym.Env[Observation, Action]):
                 f" got {tca_period}"
             )
         self.render_mode: str | None = render_mode
-        self.robot = robot or TetrapodSpec()
-        part = scene(mjcf("course.xml"), tetrapod(self.robot), {}, name="robot")
-        self.sim = Simulation(part, timestep=timestep, tca_period=tca_period)
+        self.robot = robot or TetrapodSpec(
+            spine=LIFTING_SPINE, heater=HeaterSpec.fitted(LIFTING_SPINE)
+        )
+        self.sim = tetrapod_scene(
+            mjcf("course.xml"), {}, self.robot, timestep=timestep, period=tca_period
+        )
         self.observation_space = OBSERVATION.space
         self.action_space = ACTION.space
         self._camera, self._size = camera, size
@@ -342,9 +352,9 @@ class TetrapodCourse(gym.Env[Observation, Action]):
         )
 
     def _fallen(self) -> bool:
-        """Whether the robot has turned over or dropped below the desks."""
+        """Whether the robot has turned over or dropped into the gap."""
         _, x, y, _ = self.data.qpos[self._root + 3 : self._root + 7]
-        return bool(1.0 - 2.0 * (x * x + y * y) < _TURNED or self.position[2] < -0.05)
+        return bool(1.0 - 2.0 * (x * x + y * y) < _TURNED or self.position[2] < _LOST)
 
     def _damage(self) -> str | None:
         sim = self.sim
@@ -379,9 +389,7 @@ class TetrapodCourse(gym.Env[Observation, Action]):
         return {
             "energy": self.energy,
             "tca_energy": dict(zip(sim.tca_names, sim.energy.tolist(), strict=True)),
-            "heater_energy": dict(
-                zip(sim.spines.names, sim.spines.energy.tolist(), strict=True)
-            ),
+            "heater_energy": dict(zip(sim.spines.names, sim.spines.energy.tolist(), strict=True)),
             "touched_plate": self.touched,
             "damaged": sim.spines.damaged.copy(),
             "body_angle": self.body_angle,

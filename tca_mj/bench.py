@@ -1,17 +1,18 @@
-"""How fast it runs here: the arm, its task, its recordings.
+"""How fast it runs here: the TCAs alone, the arm, its task, its recordings.
 
 Every figure is a median over single steps, in processor time: machines are noisy, and what else
 runs on them must not count. Physics and TCAs use one thread, so that processor time is what passes
 on a machine with nothing else to do. ``env.step`` is compared with the ``mj_step`` calls in it,
 timed in place, and with a bare replay: as many steps in one call from the state that it started
 from, with the TCAs as they were, now before and now after it. What a recording costs includes the
-threads that write it.
+threads that write it. The TCA that is measured alone is the free-stroke TCA of the catalogue.
 """
 
 import json
 import tempfile
 import time
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any, Self
 
@@ -26,10 +27,31 @@ from tca_mj.envs.arm import ArmPickPlace
 from tca_mj.envs.wrappers import RecordRerun
 from tca_mj.machine import machine, versions
 from tca_mj.sim import Simulation
+from tca_mj.tca import (
+    CATALOGUE,
+    CoilRods,
+    CoilSurfaces,
+    Heating,
+    Load,
+    LoadedTcas,
+    hanging_length,
+    solve_course,
+)
 
-# What is aimed at: real-time factor of the arm, env.step over its physics steps, and the
-# recorder's share of the simulation's time.
-TARGETS = {"real_time_factor": 5.0, "step_ratio": 1.25, "recording_share": 0.20}
+# What is aimed at: real-time factor of the arm, env.step over its physics steps, the recorder's
+# share of the simulation's time; seconds per solution of the rod and per look-up of the surface,
+# and how many times faster than the published rod a hanging weight moves.
+TARGETS = {
+    "real_time_factor": 5.0,
+    "step_ratio": 1.25,
+    "recording_share": 0.20,
+    "rod": 1e-6,
+    "surface": 2e-7,
+    "dynamics_factor": 1000.0,
+}
+# What a simulated second took with the published rod [s]; Sun, dissertation, Colorado State
+# University, Section 3.4.4.
+PUBLISHED = 24.0
 
 _HOT = 120.0  # steady temperature of the bending TCA of the hot bent arm [°C]
 _STATE = int(mujoco.mjtState.mjSTATE_INTEGRATION)
@@ -43,8 +65,9 @@ def benchmark(*, scale: float = 1.0, out: Path | None = None) -> dict[str, Any]:
         out: Folder for ``benchmark.json`` and ``benchmark.md``; None to write nothing.
 
     Returns:
-        ``machine``, ``versions``, ``model`` (its size), ``arm`` (idle and hot arm), ``episode``
-        (by phase), ``recording`` and ``bank``; processor times in s; ``report`` says what they are.
+        ``machine``, ``versions``, ``tca``, ``model`` (the arm's size), ``arm`` (idle and hot),
+        ``episode`` (by phase), ``recording`` and ``bank``; processor times in s; ``report`` says
+        what they are.
 
     Raises:
         ValueError: If ``scale`` is not above 0 and at most 1.
@@ -54,6 +77,7 @@ def benchmark(*, scale: float = 1.0, out: Path | None = None) -> dict[str, Any]:
     task = ArmPickPlace()
     steps = max(int(400 * scale), 4)
     repetitions = max(int(100 * scale), 2)
+    tca = _tca(scale)
     with tqdm(total=3 * repetitions + 2 * steps, disable=None, unit="step", leave=False) as bar:
         task.reset(seed=0)
         idle = _arm(task.sim, np.zeros(task.sim.n), repetitions, bar.update)
@@ -62,6 +86,7 @@ def benchmark(*, scale: float = 1.0, out: Path | None = None) -> dict[str, Any]:
         result = {
             "machine": machine(),
             "versions": versions(),
+            "tca": tca,
             "model": {
                 "degrees_of_freedom": int(task.model.nv),
                 "bodies": int(task.model.nbody),
@@ -91,6 +116,8 @@ def report(result: dict[str, Any]) -> str:
     lines = [
         f"{where['cpu']}, {where['cores']} cores; {where['system']}",
         f"{kept}",
+        "",
+        *_tca_report(result["tca"]),
         "",
         f"Scene of the arm: {model['degrees_of_freedom']} degrees of freedom,"
         f" {model['bodies']} bodies, {model['tcas']} TCAs; time step"
@@ -130,6 +157,76 @@ def report(result: dict[str, Any]) -> str:
         f"| bank.advance, {model['tcas']} TCAs | {1e6 * bank['advance']:.0f} µs |",
     ]
     return "\n".join(lines)
+
+
+def _tca(scale: float) -> dict[str, float]:
+    """Times of the laws per TCA, and of a simulated second of a hanging weight per TCA."""
+    repetitions, steps = max(int(40 * scale), 2), max(int(1000 * scale), 100)
+    tca, load, random = CATALOGUE["free-stroke"], Load.weight(0.03), np.random.default_rng(0)
+
+    def median(call: Callable[[], object], repetitions: int = repetitions) -> float:
+        call()
+        taken = []
+        for _ in range(repetitions):
+            start = time.thread_time()
+            call()
+            taken.append(time.thread_time() - start)
+        return float(np.median(taken))
+
+    n = 10_000
+    specs = [tca] * n
+    rods, surfaces = CoilRods(specs), CoilSurfaces(specs)
+    length = tca.rest_length * random.uniform(0.8, 1.6, n)
+    temperature, weight = random.uniform(25.0, 160.0, n), random.uniform(0.02, 0.6, n)
+    result = {
+        "rod": median(partial(rods.tension, length, temperature)) / n,
+        "hanging_length": median(partial(hanging_length, tca, temperature, weight)) / n,
+        "surface": median(partial(surfaces.tension, length, temperature)) / n,
+    }
+
+    dt, heating = 1e-3, Heating(source="power", value=0.6)
+    few = max(repetitions // 8, 2)
+    for law in ("rod", "surface"):
+        for name, m in (("one", 1), ("thousand", 1000)):
+            several = [tca] * m
+            tension = None if law == "rod" else CoilSurfaces(several).tension
+            lifting = LoadedTcas(several, load, law=tension)
+            state = lifting.rest()
+            stepped = median(partial(lifting.simulate, state, heating, dt, steps), few)
+            result[f"steps, {name}, {law}"] = stepped / (m * steps * dt)
+            if m == 1:
+                at_once = median(partial(solve_course, lifting, state, heating, dt, steps), few)
+                result[f"course, {name}, {law}"] = at_once / (steps * dt)
+    return result
+
+
+def _tca_report(tca: dict[str, float]) -> list[str]:
+    lines = [
+        "| 10,000 TCAs in one call | per TCA | aim |",
+        "|---|---|---|",
+        f"| rod, tension and slope at a length | {1e6 * tca['rod']:.3f} µs"
+        f" | {1e6 * TARGETS['rod']:g} µs |",
+        f"| rod, length under a load | {1e6 * tca['hanging_length']:.3f} µs"
+        f" | {1e6 * TARGETS['rod']:g} µs |",
+        f"| surface, tension and slope | {1e6 * tca['surface']:.3f} µs"
+        f" | {1e6 * TARGETS['surface']:g} µs |",
+        f"| rod over surface | {tca['rod'] / tca['surface']:.1f} | |",
+        "",
+        f"| a hanging weight, 1 s in 1 ms steps | per TCA | faster than {PUBLISHED:g} s"
+        f" (aim: {TARGETS['dynamics_factor']:,.0f} times) |",
+        "|---|---|---|",
+    ]
+    ways = {
+        "steps, one": "step by step",
+        "course, one": "all steps at once",
+        "steps, thousand": "a thousand TCAs, step by step",
+    }
+    for key, way in ways.items():
+        for law in ("rod", "surface"):
+            taken = tca[f"{key}, {law}"]
+            factor = PUBLISHED / taken
+            lines.append(f"| {way}, {law} | {1e3 * taken:.3g} ms | {factor:,.0f} times |")
+    return lines
 
 
 def _arm(

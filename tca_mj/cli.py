@@ -285,11 +285,10 @@ def _policy(name: str, env: Any, seed: int) -> Any:
 
     import numpy as np
 
-    from tca_mj.agents.scripted import PickAndPlace
     from tca_mj.envs.viewer import ViewerPolicy
 
     if name == "scripted":
-        script = PickAndPlace()
+        script = scripted(env.unwrapped)
         return ViewerPolicy(script.act, script.reset)
     if name == "random":
         env.action_space.seed(seed)
@@ -299,9 +298,24 @@ def _policy(name: str, env: Any, seed: int) -> Any:
     space = env.action_space
     still = np.array(0.5 * (space.low + space.high), dtype=space.dtype)
     for entry in table.entries:
-        if "power" in entry.name:
+        if "power" in entry.name or "voltage" in entry.name:
             still[table.slices[entry.name]] = space.low[table.slices[entry.name]]
     return ViewerPolicy(lambda observation: still)
+
+
+def scripted(task: Any) -> Any:
+    """The scripted policy of a task, with ``act`` and ``reset``."""
+    from tca_mj.agents.course import CourseWalker
+    from tca_mj.agents.morph import MorphPolicy
+    from tca_mj.agents.scripted import PickAndPlace
+    from tca_mj.agents.tetrapod_gaits import GaitPolicy
+
+    name = type(task).__name__
+    if name == "TetrapodCourse":
+        return CourseWalker(task)
+    if name == "TetrapodGait":
+        return GaitPolicy.of(task.gait)
+    return MorphPolicy() if name == "MorphModule" else PickAndPlace()
 
 
 def _bench(arguments: argparse.Namespace) -> int:

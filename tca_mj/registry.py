@@ -5,7 +5,9 @@ their ids known. So this file names them as strings, which Gymnasium resolves in
 and imports nothing but Gymnasium itself.
 """
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
 
 import gymnasium
 
@@ -18,11 +20,13 @@ class Task:
         id: Gymnasium id, ``TCA/<Name>-v<n>``.
         entry_point: ``module:class`` of the environment.
         max_episode_steps: Number of control steps after which ``TimeLimit`` truncates.
+        kwargs: Arguments of the class that make it this task; a caller's own come on top.
     """
 
     id: str
     entry_point: str
     max_episode_steps: int
+    kwargs: Mapping[str, Any] = field(default_factory=dict)
 
 
 TASKS = (
@@ -30,6 +34,25 @@ TASKS = (
         id="TCA/ArmPickPlace-v0",
         entry_point="tca_mj.envs.arm:ArmPickPlace",
         max_episode_steps=1000,
+    ),
+    Task(
+        id="TCA/MorphModule-v0",
+        entry_point="tca_mj.envs.morph:MorphModule",
+        max_episode_steps=800,
+    ),
+    *(
+        Task(
+            id=f"TCA/Tetrapod{gait.capitalize()}-v0",
+            entry_point="tca_mj.envs.tetrapod:TetrapodGait",
+            max_episode_steps=600,
+            kwargs={"gait": gait},
+        )
+        for gait in ("crawl", "walk", "shimmy")
+    ),
+    Task(
+        id="TCA/TetrapodCourse-v0",
+        entry_point="tca_mj.envs.course:TetrapodCourse",
+        max_episode_steps=15000,
     ),
 )
 
@@ -42,4 +65,5 @@ def register() -> None:
                 task.id,
                 entry_point=task.entry_point,
                 max_episode_steps=task.max_episode_steps,
+                kwargs=dict(task.kwargs),
             )

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
 
-from tca_mj.agents.course import CRAWL, REACH, SHIMMY, WALK, Bend, CourseWalker, Go, stages
+from tca_mj.agents.course import CRAWL, PUSH, SHIMMY, STEP, WALK, Bend, CourseWalker, Go, stages
 from tca_mj.agents.demo import tetrapod_course
 from tca_mj.cli import outcome, speed_table
 from tca_mj.envs.course import ACTION, OBSERVATION, TetrapodCourse
@@ -159,7 +159,7 @@ def test_touching_the_plate_is_seen_and_spoils_success(shared):
     bent(shared, np.radians(95.0), 0.09, 0.075)  # as tall as it walks, where the plate is
     *_, info = shared.step(OFF)
     assert info["touched_plate"] and info["reward_terms"]["touch"] == -0.1
-    bent(shared, np.radians(20.0), shared.places.target, 0.01)
+    bent(shared, np.radians(20.0), shared.places.target, -0.03)
     _, _, terminated, _, info = shared.step(OFF)
     assert terminated and not info["success"]
     shared.reset(seed=0)
@@ -168,19 +168,20 @@ def test_touching_the_plate_is_seen_and_spoils_success(shared):
 
 def test_lying_flat_and_cold_on_the_target_is_the_finish(shared):
     shared.reset(seed=0)
-    bent(shared, np.radians(20.0), shared.places.target, 0.01)
+    bent(shared, np.radians(20.0), shared.places.target, -0.03)
     _, reward, terminated, truncated, info = shared.step(OFF)
     assert terminated and not truncated and info["success"]
     assert info["reward_terms"]["finish"] == 20.0
     shared.reset(seed=0)
-    bent(shared, np.radians(95.0), shared.places.target, 0.08)  # there, but standing
+    bent(shared, np.radians(95.0), shared.places.target, 0.035)  # there, but standing
     _, _, terminated, _, info = shared.step(OFF)
     assert not terminated and not info["success"]
 
 
 def test_a_fall_into_the_gap_ends_the_episode(shared):
     shared.reset(seed=0)
-    bent(shared, np.radians(20.0), 0.5 * (shared.places.first_edge + shared.places.second_edge), -0.2)
+    gap = 0.5 * (shared.places.first_edge + shared.places.second_edge)
+    bent(shared, np.radians(20.0), gap, -0.3)
     _, _, terminated, _, info = shared.step(OFF)
     assert terminated and info["termination_reason"] == "fallen" and not info["success"]
 
@@ -193,7 +194,7 @@ def test_a_tca_that_contracts_against_a_stiff_spine_is_harmed(shared):
     assert info["damaged"].all() and info["reward_terms"]["damage"] == -15.0
     *_, info = shared.step(action)
     assert info["damaged"].all() and info["reward_terms"]["damage"] == 0.0  # once is enough
-    bent(shared, np.radians(20.0), shared.places.target, 0.01)
+    bent(shared, np.radians(20.0), shared.places.target, -0.03)
     shared.sim.spines.damaged[:] = True
     *_, info = shared.step(OFF)
     assert info["reward_terms"]["finish"] == 20.0 and not info["success"]
@@ -208,7 +209,7 @@ def test_the_course_file_and_the_plan_agree(shared):
     assert ends == sorted(ends)
     assert isinstance(plan[-1], Bend) and plan[-1].angle is None
     limit = TetrapodCourse.max_temperature
-    for gait in (CRAWL, WALK, SHIMMY, REACH):
+    for gait in (CRAWL, WALK, PUSH, SHIMMY, STEP):
         assert gait.temperature(np.linspace(0.0, 1.0, 101)).max() < limit
 
 
@@ -218,7 +219,7 @@ def test_the_crawl_goes_forward_and_the_walk_is_faster():
     for gait, angle, z in (("crawl", 20.0, 0.013), ("walk", 95.0, 0.075)):
         env = TetrapodCourse()
         env.reset(seed=0)
-        bent(env, np.radians(angle), 0.0 if gait == "crawl" else 0.25, z)
+        bent(env, np.radians(angle), 0.0 if gait == "crawl" else 0.3, z)
         walker = CourseWalker(env)
         walker._number = [stage.name for stage in stages(env.places)].index(gait)
         observation = env._observe()

@@ -81,3 +81,9 @@ def test_the_arms_page_has_the_observation_table():
     from tca_mj.envs.arm import OBSERVATION
 
     assert OBSERVATION.markdown() in (ROOT / "docs" / "arm.md").read_text(encoding="utf-8")
+
+
+def test_the_tetrapods_page_has_the_observation_table():
+    from tca_mj.envs.tetrapod import OBSERVATION
+
+    assert OBSERVATION.markdown() in (ROOT / "docs" / "tetrapod.md").read_text(encoding="utf-8")

@@ -48,7 +48,8 @@ class Part:
         mine = {item.name for item in self.tcas} | {item.name for item in self.spines}
         renamed = tuple(tca.renamed(f"{prefix}.") for tca in child.tcas)
         spines = tuple(spine.renamed(f"{prefix}.") for spine in child.spines)
-        clash = [item.name for item in (*renamed, *spines) if item.name in mine]
+        added = [tca.name for tca in renamed] + [spine.name for spine in spines]
+        clash = [name for name in added if name in mine]
         if clash:
             raise ValueError(f"prefix must make the TCAs' names unique, {clash} exist already")
         self.spec.attach(child.spec, site=site, prefix=f"{prefix}.")

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 from tca_mj.model.chain import Chain, Motion
-from tca_mj.rod.beam import require_positive, torsion_constant
+from tca_mj.rod.beam import require_count, require_positive, torsion_constant
 from tca_mj.smp import HeaterSpec, SpineSpec
 
 # Shear modulus over Young's modulus, at any temperature: Poisson's ratio 0.35 when glassy, 0.5 when
@@ -55,7 +55,7 @@ def route_spine(
     *,
     name: str,
     tca: str,
-    torsion: float | None = None,
+    torsion: float | Sequence[float] | None = None,
     damping_time: float = 5e-3,
 ) -> RoutedSpine:
     """Lets a spine stiffen the joints of the chains it runs through.
@@ -69,41 +69,59 @@ def route_spine(
         chains: The chains, one behind the other.
         name: Its name.
         tca: Name of the TCA that bends it.
-        torsion: Torsional stiffness over the modulus E [m⁴]; by default that of its section.
+        torsion: Torsional stiffness over the modulus E [m⁴], of all nodes or of each of the chains'
+            nodes in their order; by default that of its section.
         damping_time: Kelvin-Voigt time [s]. Estimate.
 
     Raises:
-        ValueError: If a number is not positive.
+        ValueError: If a number is not positive, or ``torsion`` has not one for each node.
     """
+    nodes = [(chain.cell, joints) for chain in chains for joints in chain.joints]
     if torsion is None:
         torsion = SHEAR_RATIO * torsion_constant(spec.width, spec.thickness)
-    require_positive(torsion=torsion)
+    each = list(torsion) if isinstance(torsion, Sequence) else [torsion] * len(nodes)
+    if len(each) != len(nodes):
+        raise ValueError(f"torsion must be one number or {len(nodes)}, got {len(each)}")
+    require_positive(**{f"torsion[{i}]": value for i, value in enumerate(each)})
     section: dict[Motion, float] = {
         "bend_x": spec.second_moment,
         "bend_y": spec.thickness * spec.width**3 / 12.0,
-        "twist": torsion,
         "stretch": spec.width * spec.thickness,
     }
     joints = [
-        (joint, section[motion] / chain.cell)
-        for chain in chains
-        for node in chain.joints
+        (joint, (twist if motion == "twist" else section[motion]) / cell)
+        for (cell, node), twist in zip(nodes, each, strict=True)
         for motion, joint in node.items()
     ]
     return RoutedSpine(name, spec, heater, tuple(joints), tca, damping_time)
 
 
-def lumped_torsion(spec: SpineSpec, places: Sequence[float]) -> float:
+def lumped_torsion(spec: SpineSpec, places: Sequence[float], nodes: int) -> tuple[float, ...]:
     """Torsional stiffness over E of one of several parallel spines between two rigid rails [m⁴].
 
-    Rails that pitch against each other by φ twist each spine, J G/E, and bend the one at the distance
-    d from the axis out of line by d φ, its ends clamped: 12 E I d²/L³ φ, seen as a torsion of
-    12 I d²/L². Exact for straight spines and small angles.
+    Rails that pitch against each other by φ do two things. They twist each spine evenly, against
+    J G/E. And they bend the one at the distance d from the axis out of line by d φ, its ends
+    clamped, against 12 I d²/L²: it lies along d φ (3 s² - 2 s³), so that this part of the twist is
+    6 s (1 - s) of its mean. A chain that stands for all of them twists by both in proportion to
+    what they bear. For straight spines the sum is exact. Bent into an arc the chain follows three
+    spines within 3 % in pitch up to 205°, because the twist is where it is in them.
 
     Args:
         spec: The spine.
         places: Distances d of the spines from the axis; the result is their mean [m].
+        nodes: Number of equal cells from rail to rail.
+
+    Returns:
+        One number per cell.
+
+    Raises:
+        ValueError: If ``nodes`` is no whole number above 0.
     """
+    require_count(nodes=nodes)
     spread = math.fsum(d * d for d in places) / len(places)
-    straight = SHEAR_RATIO * torsion_constant(spec.width, spec.thickness)
-    return straight + 12.0 * spec.second_moment * spread / spec.length**2
+    even = SHEAR_RATIO * torsion_constant(spec.width, spec.thickness)
+    uneven = 12.0 * spec.second_moment * spread / spec.length**2
+    middles = [(i + 0.5) / nodes for i in range(nodes)]
+    twist = [even + uneven * 6.0 * s * (1.0 - s) for s in middles]
+    mean = math.fsum(twist) / nodes
+    return tuple((even + uneven) * mean / each for each in twist)

@@ -130,8 +130,8 @@ class Spines:
         stiffness, rest, damping = self._own
         size, added = stiffness.size, self._share * modulus
         total = stiffness + np.bincount(self._place, added, size).reshape(stiffness.shape)
-        moment = np.bincount(self._place, added * reference, size).reshape(stiffness.shape)
-        moment += stiffness * rest
+        moment = stiffness * rest
+        moment += np.bincount(self._place, added * reference, size).reshape(stiffness.shape)
         body = self._body
         body.rest = np.divide(moment, total, out=rest.copy(), where=total > 0.0)
         body.stiffness = total

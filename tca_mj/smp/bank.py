@@ -52,7 +52,7 @@ class SpineBank:
             raise ValueError("specs must all be of one material smp")
         self.owner = np.asarray(owner, dtype=np.int64)
         if self.owner.ndim != 1 or not ((self.owner >= 0) & (self.owner < len(specs))).all():
-            raise ValueError(f"owner must be indices below {len(specs)}, got {owner}")
+            raise ValueError(f"owner must be indices below {len(specs)}, got {owner!r}")
         self.smp: SmpSpec = specs[0].smp
         self.heater = HeaterSpec(
             **{

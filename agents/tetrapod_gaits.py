@@ -1,0 +1,114 @@
+"""Scripted gaits of the tetrapod: which TCA is hot when, and the power that makes it so.
+
+Found by a random search for speed in each task, from what Sun, Section 6.3.2, says of the gaits;
+the search gave the figures, the sequence of the legs is the published one.
+"""
+
+from dataclasses import dataclass, field
+from types import MappingProxyType
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tca_mj.control import Gait, Thermostat
+from tca_mj.envs.stance import LEG_TCAS
+from tca_mj.envs.tetrapod import ACTION, OBSERVATION, TetrapodGait
+from tca_mj.robots.tetrapod import TetrapodSpec, tetrapod
+from tca_mj.tca import HeatSpec
+
+CRAWL = Gait(
+    period=4.0,
+    offset=(0.0, 0.0, 0.0, 0.0),
+    start=(0.0, 1.0 / 3.0, 2.0 / 3.0),
+    duty=(0.5, 0.5, 0.5),
+    hot=(165.0, 165.0, 165.0),
+    warm=(25.0, 25.0, 25.0),
+)
+"""All four feet run round a loop together, like the flippers of a sea turtle."""
+
+WALK = Gait(
+    period=5.9,
+    offset=(0.75, 0.25, 0.0, 0.5),
+    start=(0.09, 0.19, 0.59),
+    duty=(0.37, 0.41, 0.46),
+    hot=(166.0, 172.0, 155.0),
+    warm=(75.0, 92.0, 50.0),
+)
+"""An amble: rear left, front left, rear right, front right lift one after the other."""
+
+SHIMMY = Gait(
+    period=14.0,
+    offset=(0.0, 0.0, 0.5, 0.5),
+    start=(0.02, 0.29, 0.63),
+    duty=(0.37, 0.56, 0.53),
+    hot=(171.0, 172.0, 172.0),
+    warm=(25.0, 34.0, 25.0),
+)
+"""Front and rear pair clamp the beam by turns, like a caterpillar."""
+
+GAITS = MappingProxyType({"crawl": CRAWL, "walk": WALK, "shimmy": SHIMMY})
+
+_LEFT = np.array([1.0, 0.0, 1.0, 0.0])  # which of the legs are on the left
+
+
+@dataclass(slots=True)
+class GaitPolicy:
+    """A gait on feedback of the temperatures: an observation in, an action out.
+
+    Attributes:
+        gait: The gait.
+        steering: How much cooler the legs of the side to turn to are kept, per angle between where
+            the robot looks and where it ought to [K/rad].
+        robot: The robot it was told that it has.
+        time: Time since the start [s].
+    """
+
+    gait: Gait
+    steering: float = 0.0
+    robot: TetrapodSpec = field(default_factory=TetrapodSpec)
+    time: float = 0.0
+    _thermostat: Thermostat = field(init=False)
+
+    def __post_init__(self) -> None:
+        heats = [tca.spec.heat for tca in tetrapod(self.robot).tcas[:LEG_TCAS]]
+        heat = HeatSpec(
+            capacity=np.array([heat.capacity for heat in heats]),
+            loss=np.array([heat.loss for heat in heats]),
+        )
+        self._thermostat = Thermostat(heat=heat, max_power=TetrapodGait.max_power)
+
+    @classmethod
+    def of(cls, gait: str, robot: TetrapodSpec | None = None) -> "GaitPolicy":
+        """The scripted policy of a task.
+
+        Args:
+            gait: ``crawl``, ``walk`` or ``shimmy``.
+            robot: The robot, by default the one that is the default everywhere.
+
+        Raises:
+            ValueError: If there is no such gait.
+        """
+        if gait not in GAITS:
+            raise ValueError(f"gait must be one of {list(GAITS)}, got {gait!r}")
+        return cls(GAITS[gait], _STEERING[gait], robot or TetrapodSpec())
+
+    def reset(self) -> None:
+        """Starts anew."""
+        self.time = 0.0
+
+    def act(self, observation: NDArray[np.float32]) -> NDArray[np.float32]:
+        """The action for the next control period, shape (12,)."""
+        rows = OBSERVATION.read(observation.astype(np.float64))
+        target = self.gait.temperature(self.time / self.gait.period).reshape(len(_LEFT), -1)
+        x, y = rows["commanded direction"]
+        weaker = np.clip(self.steering * np.arctan2(y, x), -80.0, 80.0)
+        side = _LEFT if weaker > 0.0 else 1.0 - _LEFT
+        target = target - abs(weaker) * side[:, None]
+        self.time += TetrapodGait.control_period
+        power = self._thermostat.power(rows["TCA temperature"], target.ravel())
+        action = 2.0 * power / TetrapodGait.max_power - 1.0
+        return np.clip(action, -1.0, 1.0).astype(ACTION.space.dtype)
+
+
+# The side that is to be turned to makes shorter strokes. Estimates that hold the direction.
+_STEERING = {"crawl": 600.0, "walk": 600.0, "shimmy": 0.0}

@@ -1,0 +1,208 @@
+"""The tetrapod in a scene: how it is put there, and where it is."""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from tca_mj.model.part import Part
+from tca_mj.model.scene import scene
+from tca_mj.robots.tetrapod import LEGS, TetrapodSpec, tetrapod
+from tca_mj.sim import Simulation
+
+Array = NDArray[np.float64]
+
+LEG_TCAS = 3 * len(LEGS)
+
+# Cameras that follow the robot: place about it and what they look at, from its middle [m].
+_VIEWS = {
+    "follow": ((0.24, -0.29, 0.17), (0.0, 0.0, -0.03)),
+    "front": ((0.45, 0.0, 0.04), (0.0, 0.0, -0.01)),
+    "side": ((0.0, -0.45, 0.04), (0.0, 0.0, -0.01)),
+}
+CAMERAS = tuple(_VIEWS)
+
+# A foot of 0.3 g is pushed and pulled by forces that accelerate it by 200 m/s². Where contacts are
+# so stiff that it rests at no depth, it loses the ground for single time steps, falls a millimetre
+# in each and is thrown on: the robot walks half as fast again, and the faster the longer the step.
+# Elliptic cones and an impedance of a half at the surface let it rest 0.2 mm deep, below a margin
+# of as much. The ratio keeps splayed legs from creeping apart: 0.04 mm in 20 s, 7 mm at a ratio 10.
+_IMPEDANCE = (0.5, 0.99, 5e-4, 0.5, 2.0)
+_IMPEDANCE_RATIO = 3000.0
+_MARGIN = 0.2e-3  # [m]
+
+_MARCH = 2e-3  # step downwards while the ground is looked for [m]
+_SPREAD = 0.12  # largest bend of each node of a leg that starts beside a beam [rad]
+_HALVINGS = 14
+
+
+def tetrapod_scene(
+    arena: Path, objects: Mapping[str, Path], spec: TetrapodSpec, *, timestep: float, period: float
+) -> Simulation:
+    """The robot ``robot`` in an arena, with contacts that suit its light feet and with ``CAMERAS``.
+
+    Args:
+        arena: MJCF file of the arena.
+        objects: MJCF files of what is put into it, by name.
+        spec: The robot.
+        timestep: Physics time step [s].
+        period: Time between two updates of the TCAs [s].
+
+    Raises:
+        ValueError: If a file is missing, a time is bad or the robot cannot be built.
+    """
+    part = scene(arena, tetrapod(spec), objects, name="robot")
+    _soften(part)
+    hub = part.spec.body("robot.hub")
+    for name, (place, towards) in _VIEWS.items():
+        camera = hub.add_camera(name=name, pos=place, quat=_looking(place, towards), fovy=38.0)
+        camera.mode = mujoco.mjtCamLight.mjCAMLIGHT_TRACK
+    return Simulation(part, timestep=timestep, tca_period=period)
+
+
+def _looking(place: Sequence[float], towards: Sequence[float]) -> Array:
+    """Quaternion of a camera at ``place``, level, that looks at ``towards``."""
+    back = np.subtract(place, towards)
+    right = np.array([-back[1], back[0], 0.0])
+    axes = np.stack([right, np.cross(back, right), back])
+    axes /= np.linalg.norm(axes, axis=1, keepdims=True)
+    turn = np.empty(4)
+    mujoco.mju_mat2Quat(turn, axes.T.ravel())
+    return turn
+
+
+def _soften(part: Part) -> None:
+    option = part.spec.option
+    option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
+    option.impratio = _IMPEDANCE_RATIO
+    option.jacobian = mujoco.mjtJacobian.mjJAC_SPARSE  # four legs apart: two thirds of the time
+    for geom in part.spec.geoms:
+        if geom.priority > 0:  # the robot's: they decide on every contact
+            geom.solimp = _IMPEDANCE
+            geom.margin = _MARGIN
+
+
+class Stance:
+    """Where to read and set the robot ``robot`` of a simulation.
+
+    Attributes:
+        hub: Id of the body in the middle of its spines.
+        feet: Ids of the sites in the middle of its feet, in the order of ``LEGS``.
+    """
+
+    def __init__(self, sim: Simulation, spec: TetrapodSpec) -> None:
+        """Looks up its addresses in ``sim``, which was built of ``spec``."""
+        model = self._model = sim.model
+        self.hub = int(model.body("robot.hub").id)
+        self.feet = np.array([model.site(f"robot.{leg}.foot").id for leg in LEGS])
+        root = model.joint("robot.root").id
+        self._q, self._v = int(model.jnt_qposadr[root]), int(model.jnt_dofadr[root])
+
+        def address(names: list[str]) -> NDArray[np.int64]:
+            return np.array([model.jnt_qposadr[model.joint(name).id] for name in names])
+
+        sides = {"left": -1.0, "right": 1.0}
+        spine = {s: [f"robot.{s}.bend_x{i}" for i in range(spec.nodes)] for s in sides}
+        self._bends = address([name for names in spine.values() for name in names])
+        self._signs = np.repeat(list(sides.values()), spec.nodes)
+        nodes = range(spec.leg.nodes)
+        self._lifts = address([f"robot.{leg}.rod.bend_y{i}" for leg in LEGS for i in nodes])
+        bodies = [model.body(int(body)).name for body in model.geom_bodyid]
+        self._leg = np.full(model.ngeom, -1)  # which leg a geom belongs to
+        for i, leg in enumerate(LEGS):
+            self._leg[[name.startswith(f"robot.{leg}.") for name in bodies]] = i
+
+    def bend(self, data: mujoco.MjData) -> float:
+        """Angle between the ends of the spines, 0 if they are straight [rad]."""
+        return float(self._signs @ data.qpos[self._bends])
+
+    def position(self, data: mujoco.MjData) -> Array:
+        """Of the hub in the world, shape (3,) [m]."""
+        return data.xpos[self.hub]
+
+    def rotation(self, data: mujoco.MjData) -> Array:
+        """Of the hub: its x axis (forward), y axis (left) and z axis as columns, (3, 3)."""
+        return data.xmat[self.hub].reshape(3, 3)
+
+    def velocity(self, data: mujoco.MjData) -> tuple[Array, Array]:
+        """Of the hub in its own frame: linear [m/s] and angular [rad/s], shape (3,) each."""
+        v = data.qvel[self._v : self._v + 6]
+        return self.rotation(data).T @ v[:3], v[3:]
+
+    def feet_in_body(self, data: mujoco.MjData) -> Array:
+        """Middles of the feet in the hub's frame, in the order of ``LEGS``, shape (4, 3) [m]."""
+        return (data.site_xpos[self.feet] - self.position(data)) @ self.rotation(data)
+
+    def touching(self, data: mujoco.MjData) -> Array:
+        """1 for each leg that touches something with foot or plates, else 0, shape (4,)."""
+        touched = np.zeros(len(LEGS))
+        geoms = data.contact.geom
+        if len(geoms):
+            legs = self._leg[geoms]
+            touched[legs[legs >= 0]] = 1.0
+        return touched
+
+    def placer(
+        self,
+        *,
+        bend: float,
+        position: tuple[float, float] = (0.0, 0.0),
+        yaw: float = 0.0,
+        above: float = 0.0,
+    ) -> Callable[[mujoco.MjData], None]:
+        """What ``Simulation.reset`` needs to put the robot onto what is below it.
+
+        Its body is in shape and its legs are straight, or spread so far that the feet touch the
+        sides of what it stands astride of.
+
+        Args:
+            bend: Angle between the ends of the spines [rad].
+            position: x and y of the hub [m].
+            yaw: Direction that it looks into, from world x [rad].
+            above: Height of what it is put onto [m].
+
+        Raises:
+            ValueError: When it is called, if there is nothing at that height.
+        """
+
+        def place(data: mujoco.MjData) -> None:
+            data.qpos[self._bends] = self._signs * bend / len(self._bends)
+            turn = (math.cos(yaw / 2.0), 0.0, 0.0, math.sin(yaw / 2.0))
+            data.qpos[self._q : self._q + 7] = (*position, above, *turn)
+
+            def at(height: float, spread: float) -> tuple[bool, bool]:
+                """Whether something is touched from above, and from the side."""
+                data.qpos[self._q + 2] = height
+                data.qpos[self._lifts] = spread
+                mujoco.mj_kinematics(self._model, data)
+                mujoco.mj_collision(self._model, data)
+                if not data.ncon:
+                    return False, False
+                steep = np.abs(data.contact.frame[:, 2]) > 0.5
+                return bool(steep.any()), bool((~steep).any())
+
+            # Legs pointing down stand on their feet, those below a beam's top only hang beside it.
+            aside = at(above - _MARCH, 0.0)[1]
+            widest = _SPREAD if aside else 0.0
+            high = above + 0.15
+            while not at(high - _MARCH, widest)[0]:
+                high -= _MARCH
+                if high < above - 0.15:
+                    raise ValueError(f"position must be above something, got {position}")
+            height = _bisect(lambda z: not at(z, widest)[0], high - _MARCH, high)
+            if aside:
+                widest = _bisect(lambda angle: not at(height, angle)[1], 0.0, widest)
+            at(height, widest)
+
+        return place
+
+
+def _bisect(free: Callable[[float], bool], low: float, high: float) -> float:
+    """The smallest number from which on ``free`` holds, as it does at ``high``."""
+    for _ in range(_HALVINGS):
+        middle = (low + high) / 2.0
+        low, high = (low, middle) if free(middle) else (middle, high)
+    return high

@@ -1,0 +1,387 @@
+"""``TCA/TetrapodCrawl-v0``, ``Walk`` and ``Shimmy``: a robot of one shape gets on (Sun, 6.3.2)."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from typing import Any, ClassVar
+
+import gymnasium as gym
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from tca_mj.assets import mjcf
+from tca_mj.envs.stance import CAMERAS, LEG_TCAS, Stance, tetrapod_scene
+from tca_mj.envs.table import Entry, Table, numbers
+from tca_mj.render import Offscreen, colour_tendons
+from tca_mj.robots.tetrapod import TetrapodSpec
+from tca_mj.sim import SimulationDiverged
+from tca_mj.variation import Nominal, Variation
+
+Observation = NDArray[np.float32]
+Action = NDArray[np.float32]
+
+OBSERVATION = Table(
+    [
+        Entry("TCA temperature", LEG_TCAS, -50.0, 300.0, "°C"),
+        Entry("TCA length", LEG_TCAS, 0.0, 0.15, "m"),
+        Entry("TCA tension", LEG_TCAS, 0.0, 5.0, "N"),
+        Entry("orientation", 4, -1.0, 1.0, "quaternion wxyz"),
+        Entry("height", 1, -0.5, 0.5, "m"),
+        Entry("velocity", 3, -10.0, 10.0, "m/s"),
+        Entry("angular velocity", 3, -1000.0, 1000.0, "rad/s"),
+        Entry("foot position", 12, -0.5, 0.5, "m"),
+        Entry("leg contact", 4, 0.0, 1.0, "1 if foot or plates touch something"),
+        Entry("body bend", 1, -6.3, 6.3, "rad"),
+        Entry("commanded direction", 2, -1.0, 1.0, "-"),
+    ]
+)
+ACTION = Table([Entry("TCA power", LEG_TCAS, -1.0, 1.0, "-")])
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class GaitTask:
+    """What one of the tasks asks for.
+
+    Attributes:
+        bend: Angle between the ends of the spines [rad].
+        speed: The published speed [m/s]; Sun, Section 6.3.2.
+        beam: Height of the beam that the robot stands astride of, or None for the ground [m].
+        yaw_range: Largest angle by which the robot may look aside at the start [rad].
+    """
+
+    bend: float
+    speed: float
+    beam: float | None = None
+    yaw_range: float = 0.05
+
+
+TASKS = {
+    # Sun's crawling robot is "almost flat": it keeps the memorised shape.
+    "crawl": GaitTask(bend=TetrapodSpec().memory_angle, speed=2.4e-3),
+    "walk": GaitTask(bend=math.radians(93.0), speed=9e-3),
+    # Sun's U shape has no number. Estimate: the feet press against the beam and can leave it.
+    "shimmy": GaitTask(bend=math.radians(206.0), speed=0.75e-3, beam=0.12, yaw_range=0.005),
+}
+
+_SETTLING = 0.5  # time in which the robot comes to rest after it is put down [s]
+_UPRIGHT = 0.5  # cosine of the tilt from which on it has fallen over
+_SUNK = 12e-3  # depth below its first height at which it has fallen off the beam [m]
+
+
+class TetrapodGait(gym.Env[Observation, Action]):
+    """Get on in a commanded direction, cold and rigid in one shape, by the legs alone.
+
+    The morphing tetrapod crawls flat, walks with its body bent to a right angle, or shimmies along
+    a beam that its U-shaped body and its legs embrace. It senses its TCAs, its own motion and
+    which legs touch; it acts by heating the three TCAs of each leg.
+
+    Action, shape (12,), all in [-1, 1]: power of the TCAs ``tca0`` (lifts), ``tca1`` (front, down)
+    and ``tca2`` (rear, down) of the legs front left, front right, rear left and rear right; -1 is
+    off, 1 is ``max_power``, linear in between.
+
+    Observation, shape (66,): see ``OBSERVATION``, whose rows have units and bounds. Orientation is
+    that of the hub, the middle of the spines, in the world, with a first number that is not
+    negative; height is the hub's above what the robot stands on. Velocities, feet (x, y, z of each
+    leg's) and the commanded direction (x and y of a unit vector) are in the hub's frame: x forward,
+    y left, z up.
+
+    Reward, the sum of the terms in ``info["reward_terms"]``. The first two pay for progress and
+    take it back, so that nothing is earned by shaking:
+        progress: Distance gained along the commanded direction over the published speed [s].
+        drift: Minus half of what is gained in distance from the line of that direction through the
+            start, over the published speed.
+        posture: Minus 0.2 (1 - cosine of the tilt).
+        energy: Minus 0.002 per joule of electrical energy.
+        heat: Minus 0.002 for every kelvin by which a TCA is above ``hot_temperature``.
+        end: Minus 5 in the step in which the robot falls, or a TCA is too hot or torn.
+
+    Reset: the robot is put down at the origin and comes to rest, for 0.5 s that are not counted.
+    Where it looks and how far its body is bent is drawn. Options:
+        direction: Commanded direction, from world x to y [rad]; 0 by default, on a beam also pi.
+        yaw: Where the robot looks, from world x to y [rad]; within ``task.yaw_range``.
+        bend: Bend of its body [rad]; within 1 degree of ``task.bend``.
+        friction, mass, tca_gain, heat_loss, ambient: The fields of ``tca_mj.variation.Variation``.
+        randomise: Spread with which those of them are drawn that are not given; 0.2 is 20 % and
+            5 K. By default 0.
+
+    Terminates with ``info["termination_reason"]`` when the robot has fallen over or off the beam.
+    Truncates after the time limit, and with ``info["truncation_reason"]`` if a TCA is too hot or
+    torn, or if the simulation diverged.
+    """
+
+    metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 10}
+    max_power: ClassVar[float] = 4.0  # of each TCA of a leg [W]
+    max_temperature: ClassVar[float] = 180.0  # annealing temperature, Sun, Table 2.1 [°C]
+    hot_temperature: ClassVar[float] = 172.0  # from here on heat is charged [°C]
+    control_period: ClassVar[float] = 0.1  # [s]
+    bend_range: ClassVar[float] = math.radians(1.0)  # largest deviation of the body's bend [rad]
+
+    def __init__(
+        self,
+        *,
+        gait: str = "walk",
+        render_mode: str | None = None,
+        robot: TetrapodSpec | None = None,
+        timestep: float = 5e-3,
+        camera: str = "follow",
+        size: tuple[int, int] = (960, 720),
+    ) -> None:
+        """Builds the scene.
+
+        Args:
+            gait: ``crawl``, ``walk`` or ``shimmy``.
+            render_mode: None or ``"rgb_array"``.
+            robot: The robot, by default the published one as far as it is known.
+            timestep: Physics time step, of which ``control_period`` is a multiple [s].
+            camera: Camera of the pictures, one of ``CAMERAS``; all follow the robot.
+            size: Width and height of the pictures [pixels].
+
+        Raises:
+            ValueError: If an argument is unknown or out of range, or the robot cannot be built.
+        """
+        for name, value, known in (
+            ("gait", gait, list(TASKS)),
+            ("render_mode", render_mode, [None, *self.metadata["render_modes"]]),
+            ("camera", camera, list(CAMERAS)),
+        ):
+            if value not in known:
+                raise ValueError(f"{name} must be one of {known}, got {value!r}")
+        if numbers("size", size, (2,)).min() < 1.0:
+            raise ValueError(f"size must be at least 1 pixel each way, got {size}")
+        self.gait = gait
+        self.task = TASKS[gait]
+        self.render_mode: str | None = render_mode
+        self.robot = robot or TetrapodSpec()
+        objects = {} if self.task.beam is None else {"beam": mjcf("beam.xml")}
+        self.sim = tetrapod_scene(
+            mjcf("ground.xml"),
+            objects,
+            self.robot,
+            timestep=timestep,
+            period=self.control_period,
+        )
+        self.stance = Stance(self.sim, self.robot)
+        self.observation_space = OBSERVATION.space
+        self.action_space = ACTION.space
+        self._nominal = Nominal(self.sim)
+        self._camera, self._size = camera, size
+        self._screen: Offscreen | None = None
+        self._forward = np.array([1.0, 0.0])
+        self._start = np.zeros(3)
+        self._progress = self._judge()
+
+    # What tools that know Gymnasium's own MuJoCo environments look for.
+    @property
+    def model(self) -> mujoco.MjModel:
+        """The compiled model."""
+        return self.sim.model
+
+    @property
+    def data(self) -> mujoco.MjData:
+        """MuJoCo's state."""
+        return self.sim.data
+
+    @property
+    def dt(self) -> float:
+        """Time of one step [s]."""
+        return self.control_period
+
+    @property
+    def variation(self) -> Variation:
+        """How far the robot of this episode is off."""
+        return self._nominal.variation
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Observation, dict[str, Any]]:
+        """Starts an episode; see the class for the options.
+
+        Raises:
+            ValueError: If an option is unknown or out of its range.
+        """
+        super().reset(seed=seed)
+        setup = self._setup(options or {})
+        self._nominal.apply(setup["variation"])
+        self.sim.reset(
+            self.stance.placer(bend=setup["bend"], yaw=setup["yaw"], above=self.task.beam or 0.0)
+        )
+        self.sim.step(np.zeros(self.sim.n), _SETTLING)
+        self.data.time = 0.0
+        direction = setup["direction"]
+        self._forward = np.array([math.cos(direction), math.sin(direction)])
+        self._start = self.stance.position(self.data).copy()
+        self._progress = self._judge()
+        return self._observe(), self._info()
+
+    def _setup(self, options: Mapping[str, Any]) -> dict[str, Any]:
+        """Draws what the options leave open. All draws are made, so that options shift none."""
+        random, task = self.np_random, self.task
+        drawn = {
+            "yaw": random.uniform(-task.yaw_range, task.yaw_range),
+            "bend": task.bend + random.uniform(-self.bend_range, self.bend_range),
+            "direction": 0.0,
+            "randomise": 0.0,
+        }
+        draws = random.uniform(-1.0, 1.0, len(Variation.names()))
+        known = [*drawn, *Variation.names()]
+        unknown = [key for key in options if key not in known]
+        if unknown:
+            raise ValueError(f"options must be some of {sorted(known)}, got {unknown}")
+        given = {key: float(numbers(key, value, ())) for key, value in options.items()}
+        setup = {key: given.pop(key, value) for key, value in drawn.items()}
+        for key, middle, reach in (
+            ("yaw", 0.0, task.yaw_range),
+            ("bend", task.bend, self.bend_range),
+            ("direction", 0.0, math.pi),
+            ("randomise", 0.25, 0.25),
+        ):
+            if not abs(setup[key] - middle) <= reach + 1e-9:
+                raise ValueError(
+                    f"{key} must be between {middle - reach:.4f} and {middle + reach:.4f},"
+                    f" got {setup[key]}"
+                )
+        if task.beam is not None and abs(math.sin(setup["direction"])) > 1e-6:
+            raise ValueError(f"direction must be 0 or pi on a beam, got {setup['direction']}")
+        varied = asdict(Variation.drawn(draws.tolist(), setup["randomise"]))
+        return setup | {"variation": Variation(**(varied | given))}
+
+    def step(self, action: Action) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
+        """Heats for ``control_period``; see the class.
+
+        Raises:
+            ValueError: If the action has the wrong shape, is not finite or out of [-1, 1].
+        """
+        command = numbers("action", action, (ACTION.size,))
+        if np.abs(command).max() > 1.0 + 1e-6:
+            raise ValueError(f"action must be within -1 and 1, got {command}")
+        power = np.zeros(self.sim.n)
+        power[:LEG_TCAS] = self.max_power * (np.clip(command, -1.0, 1.0) + 1.0) / 2.0
+        reason = None
+        try:
+            self.sim.step(power, self.control_period)
+        except SimulationDiverged as error:
+            reason = f"diverged: {error}"
+        observation = self._observe()
+        outside = OBSERVATION.outside(observation)
+        if outside:
+            reason = reason or f"diverged: {', '.join(outside)} out of bounds"
+            observation = OBSERVATION.bounded(observation)
+        before, tilt, fallen = self._progress, 0.0, None
+        if reason is None:  # nothing is known of a diverged state
+            self._progress = self._judge()
+            tilt = 1.0 - float(self.stance.rotation(self.data)[2, 2])
+            fallen = self._fallen(tilt)
+        terms = {name: value - before[name] for name, value in self._progress.items()}
+        damage = None if reason else self._damage()
+        excess = np.maximum(self.sim.temperature - self.hot_temperature, 0.0)
+        terms |= {
+            "posture": -0.2 * tilt,
+            "energy": -0.002 * float(np.sum(power)) * self.control_period,
+            "heat": -0.002 * float(np.sum(excess)) if reason is None else 0.0,
+            "end": -5.0 if fallen or damage else 0.0,
+        }
+        reason = reason or damage
+        info = {"reward_terms": terms, **self._info()}
+        if reason is not None:
+            info["truncation_reason"] = reason
+        if fallen is not None:
+            info["termination_reason"] = fallen
+        return (
+            observation,
+            float(sum(terms.values())),
+            fallen is not None,
+            reason is not None,
+            info,
+        )
+
+    def _judge(self) -> dict[str, float]:
+        """How far the robot has got, by reward term."""
+        along, aside = self._travelled()
+        return {"progress": along / self.task.speed, "drift": -0.5 * abs(aside) / self.task.speed}
+
+    def _travelled(self) -> tuple[float, float]:
+        """Distances from the start along the commanded direction and to the left of it [m]."""
+        moved = (self.stance.position(self.data) - self._start)[:2]
+        x, y = self._forward
+        return float(moved @ (x, y)), float(moved @ (-y, x))
+
+    def _fallen(self, tilt: float) -> str | None:
+        """How the robot has fallen, or None."""
+        if tilt > 1.0 - _UPRIGHT:
+            return "fell over"
+        if self.task.beam and self.stance.position(self.data)[2] < self._start[2] - _SUNK:
+            return "fell off the beam"
+        return None
+
+    def _damage(self) -> str | None:
+        """Why a TCA does not survive, or None."""
+        sim = self.sim
+        hot = sim.temperature > self.max_temperature
+        if hot.any():
+            name = sim.tca_names[int(np.argmax(hot))]
+            return f"overheated: {name} above {self.max_temperature} °C"
+        torn = sim.tension > sim.bank.breaking_force
+        if torn.any():
+            i = int(np.argmax(torn))
+            return f"torn: {sim.tca_names[i]} above {sim.bank.breaking_force[i]} N"
+        return None
+
+    def _observe(self) -> Observation:
+        data, sim, stance = self.data, self.sim, self.stance
+        turn = data.xquat[stance.hub]
+        linear, angular = stance.velocity(data)
+        return OBSERVATION.pack(
+            {
+                "TCA temperature": sim.temperature[:LEG_TCAS],
+                "TCA length": sim.length[:LEG_TCAS],
+                "TCA tension": sim.tension[:LEG_TCAS],
+                "orientation": turn if turn[0] >= 0.0 else -turn,
+                "height": stance.position(data)[2] - (self.task.beam or 0.0),
+                "velocity": linear,
+                "angular velocity": angular,
+                "foot position": stance.feet_in_body(data),
+                "leg contact": stance.touching(data),
+                "body bend": stance.bend(data),
+                "commanded direction": self._forward @ stance.rotation(data)[:2, :2],
+            }
+        )
+
+    def _info(self) -> dict[str, Any]:
+        sim = self.sim
+        along, aside = self._travelled()
+        return {
+            "distance": along,
+            "drift": aside,
+            "speed": along / sim.time if sim.time > 0.0 else 0.0,
+            "time": sim.time,
+            "energy": sim.energy.copy(),
+            "heater_energy": sim.spines.energy.copy(),
+            "temperature": sim.temperature.copy(),
+            "tension": sim.tension.copy(),
+            "variation": asdict(self.variation),
+        }
+
+    def render(self) -> NDArray[np.uint8] | None:
+        """A picture of the scene, shape (height, width, 3), or None without a render mode.
+
+        Raises:
+            RenderingUnavailable: If there is no OpenGL.
+        """
+        if self.render_mode is None:
+            return None
+        if self._screen is None:
+            width, height = self._size
+            self._screen = Offscreen(self.model, width=width, height=height, camera=self._camera)
+        colour_tendons(self.model, self.sim.tendon, self.sim.temperature)
+        return self._screen.draw(self.data)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Everything but the window: a copy goes on where this one is."""
+        return self.__dict__ | {"_screen": None}
+
+    def close(self) -> None:
+        """Frees what rendering took."""
+        if self._screen is not None:
+            self._screen.close()
+            self._screen = None

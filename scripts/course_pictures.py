@@ -1,0 +1,110 @@
+"""Draws the tetrapod's three shapes side by side, and the course in a strip of pictures.
+
+python scripts/course_pictures.py --out docs/pictures            # both, some minutes
+python scripts/course_pictures.py --shapes-only
+"""
+
+import argparse
+from pathlib import Path
+
+import imageio.v3 as imageio
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from tca_mj.agents.course import CourseWalker
+from tca_mj.assets import mjcf
+from tca_mj.envs.course import TetrapodCourse
+from tca_mj.model.scene import scene
+from tca_mj.render import Offscreen, colour_tendons
+from tca_mj.robots.tetrapod import TetrapodSpec, tetrapod
+from tca_mj.sim import Simulation
+
+# Bend of the body [deg] and height of its middle over the ground [m].
+SHAPES = ((20.0, 0.013), (95.0, 0.073), (180.0, 0.108))
+# Time after the start of each stage at which its picture is taken [s].
+MOMENTS = {"crawl": 50.0, "stand up": 14.0, "walk": 12.0, "mount": 20.0, "clamp": 45.0,
+           "shimmy": 60.0, "open": 40.0, "walk on": 25.0}  # fmt: skip
+LAST = "lie down"  # its picture is the last of all
+
+
+def view(model: mujoco.MjModel, x: float, distance: float, azimuth: float, elevation: float,
+         height: float = 0.03) -> mujoco.MjvCamera:  # fmt: skip
+    """A camera that looks at the place ``x`` along the course."""
+    camera = mujoco.MjvCamera()
+    mujoco.mjv_defaultFreeCamera(model, camera)
+    camera.lookat[:] = [x, 0.0, height]
+    camera.distance, camera.azimuth, camera.elevation = distance, azimuth, elevation
+    return camera
+
+
+def picture(sim: Simulation, camera: mujoco.MjvCamera, size: tuple[int, int]) -> NDArray[np.uint8]:
+    """One picture, TCAs in the colours of their temperatures."""
+    colour_tendons(sim.model, sim.tendon, sim.temperature)
+    with Offscreen(sim.model, width=size[0], height=size[1], camera=camera) as screen:
+        return screen.draw(sim.data)
+
+
+def shapes(out: Path) -> None:
+    """Flat, at 90° and as a U, as the robot stands on a table."""
+    spec, frames = TetrapodSpec(), []
+    sim = Simulation(scene(mjcf("arena.xml"), tetrapod(spec), {}, name="robot"), timestep=5e-3)
+    for angle, height in SHAPES:
+
+        def place(data: mujoco.MjData, angle: float = angle, height: float = height) -> None:
+            data.qpos[2] = height
+            for side, sign in (("left", -1.0), ("right", 1.0)):
+                for node in range(spec.nodes):
+                    joint = sim.model.joint(f"robot.{side}.bend_x{node}")
+                    data.qpos[joint.qposadr[0]] = sign * np.radians(angle) / (2 * spec.nodes)
+
+        sim.reset(place)
+        sim.step(np.zeros(sim.n), 1.0)
+        frames.append(picture(sim, view(sim.model, 0.0, 0.42, 152.0, -14.0, 0.045), (560, 480)))
+    imageio.imwrite(out / "tetrapod.png", np.concatenate(frames, axis=1))
+
+
+def course(out: Path, seed: int) -> None:
+    """A picture of each stage."""
+    env = TetrapodCourse()
+    observation, _ = env.reset(seed=seed)
+    walker, frames, since, stage = CourseWalker(env), {}, 0.0, ""
+    ended = False
+    while not ended:
+        action = walker.act(observation)
+        since = since + env.control_period if walker.phase == stage else 0.0
+        stage = walker.phase
+        if stage not in frames and since >= MOMENTS.get(stage, np.inf):
+            x = float(env.position[0])
+            camera = view(env.model, x + 0.02, 0.52, 118.0, -17.0, 0.02)
+            frames[stage] = picture(env.sim, camera, (400, 320))
+            print(f"{env.sim.time:6.1f} s  {stage}", flush=True)
+        observation, _, terminated, truncated, info = env.step(action)
+        ended = terminated or truncated
+    x = float(env.position[0])
+    frames[LAST] = picture(
+        env.sim, view(env.model, x + 0.02, 0.52, 118.0, -17.0, -0.02), (400, 320)
+    )
+    missing = [stage for stage in MOMENTS if stage not in frames]
+    if missing or not info["success"]:
+        raise SystemExit(f"no picture of {missing}, success {info['success']}")
+    order = [frames[stage] for stage in (*MOMENTS, LAST)]
+    rows = [np.concatenate(order[i : i + 3], axis=1) for i in (0, 3, 6)]
+    imageio.imwrite(out / "course.jpg", np.concatenate(rows), quality=85)
+
+
+def main(argv: list[str] | None = None) -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--out", type=Path, default=Path("docs/pictures"))
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--shapes-only", action="store_true")
+    args = parser.parse_args(argv)
+    args.out.mkdir(parents=True, exist_ok=True)
+    shapes(args.out)
+    if not args.shapes_only:
+        course(args.out, args.seed)
+    print(f"the pictures are in {args.out}")
+
+
+if __name__ == "__main__":
+    main()

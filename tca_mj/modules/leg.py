@@ -1,0 +1,186 @@
+"""The tetrapod's continuum leg: an elastic rod, rigid plates and three TCAs (Sun, Fig. 6.13B)."""
+
+import math
+from dataclasses import dataclass, field
+from typing import Any
+
+import mujoco
+
+from tca_mj.model.chain import Chain, Motion, beam
+from tca_mj.model.part import Part, new_spec
+from tca_mj.model.tendon import route_passes, route_tca
+from tca_mj.rod.beam import BeamSpec, Outline, require_count, require_positive
+from tca_mj.routes import Helix, leg_length
+from tca_mj.tca import CATALOGUE, TcaSpec
+
+CARBON_YOUNG = 130e9  # pultruded carbon-fibre rod along its fibres; estimate from data sheets [Pa]
+CARBON_SHEAR = 4.5e9  # the same, in shear along the fibres; estimate [Pa]
+CARBON_DENSITY = 1550.0  # the same; estimate [kg/m³]
+PRINTED_DENSITY = 1200.0  # printed resin and PLA, solid; estimate [kg/m³]
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class LegSpec:
+    """A leg. Sun names its parts but prints no dimension, so all of them are estimates.
+
+    Attributes:
+        length: Length of the rod between root and foot [m]. Estimate: with legs of this length
+            the robot in its U shape is a third as wide as it is flat (Sun, Section 6.3.2).
+        rod_diameter: Diameter of the carbon-fibre rod [m]. Estimate: a size that is sold, stiff
+            enough to stand on and soft enough to be bent by TCAs.
+        offset: Distance of the TCAs from the rod [m]. Estimate.
+        phase: Angle of the first TCA from the leg's x axis [rad].
+        count: Number of TCAs, at equal angles from ``phase`` on.
+        plate_radius: Radius of the plates [m]. Estimate.
+        plate_thickness: Thickness of the plates [m]. Estimate.
+        plate_fill: Share of a plate's disc that is not cut out. Estimate.
+        foot_radius: Radius of the round foot [m]. Estimate.
+        foot_mass: Mass of the foot [kg]. Estimate.
+        plate_friction: Coefficient of friction of the plates. Estimate: printed plastic on glass.
+        friction: Coefficient of friction of the foot. Estimate: silicone rubber on glass or a
+            varnished desk.
+        damping_time: Kelvin-Voigt time of the leg [s]. Estimate: the TCAs' loss, as the rod has
+            almost none.
+        nodes: Nodes of the chain, each with two bending hinges and a plate behind it.
+        tca: The kind of TCA, cut to the leg's length.
+
+    Raises:
+        ValueError: If a dimension is not finite and positive, a number not whole, the TCAs lie
+            outside the plates, or one of the two bends is missing.
+    """
+
+    length: float = 55e-3
+    rod_diameter: float = 0.45e-3
+    offset: float = 8e-3
+    phase: float = 0.0
+    count: int = 3
+    plate_radius: float = 9e-3
+    plate_thickness: float = 1e-3
+    plate_fill: float = 0.5
+    foot_radius: float = 4e-3
+    foot_mass: float = 0.3e-3
+    friction: float = 0.8
+    plate_friction: float = 0.3
+    damping_time: float = 20e-3
+    motions: tuple[Motion, ...] = ("bend_x", "bend_y")
+    nodes: int = 5
+    tca: TcaSpec = field(default_factory=lambda: CATALOGUE["free-stroke"])
+
+    def __post_init__(self) -> None:
+        require_positive(
+            **{name: getattr(self, name) for name in (
+                "length", "rod_diameter", "offset", "plate_radius", "plate_thickness",
+                "plate_fill", "plate_friction", "foot_radius", "foot_mass", "friction",
+                "damping_time",
+            )}
+        )  # fmt: skip
+        require_count(count=self.count, nodes=self.nodes)
+        if not math.isfinite(self.phase):
+            raise ValueError(f"phase must be finite, got {self.phase}")
+        if not self.offset < self.plate_radius:
+            raise ValueError(
+                f"offset must be below plate_radius {self.plate_radius} m, got {self.offset}"
+            )
+        if self.plate_fill > 1.0:
+            raise ValueError(f"plate_fill must be at most 1, got {self.plate_fill}")
+        if not {"bend_x", "bend_y"} <= set(self.motions):
+            raise ValueError(f"motions must contain 'bend_x' and 'bend_y', got {self.motions}")
+
+    @property
+    def body(self) -> BeamSpec:
+        """The rod, with the outline of its plates."""
+        area = math.pi * self.rod_diameter**2 / 4.0
+        inertia = math.pi * self.rod_diameter**4 / 64.0
+        return BeamSpec(
+            length=self.length,
+            bending=(CARBON_YOUNG * inertia, CARBON_YOUNG * inertia),
+            torsion=CARBON_SHEAR * 2.0 * inertia,
+            stretching=CARBON_YOUNG * area,
+            shearing=CARBON_SHEAR * area,
+            line_density=CARBON_DENSITY * area,
+            outline=Outline(self.plate_radius, self.plate_radius),
+            damping_time=self.damping_time,
+        )
+
+    @property
+    def plate_mass(self) -> float:
+        """Mass of one plate [kg]."""
+        disc = math.pi * self.plate_radius**2 * self.plate_thickness
+        return PRINTED_DENSITY * self.plate_fill * disc
+
+
+def continuum_leg(spec: LegSpec | None = None, *, mirrored: bool = False) -> Part:
+    """Builds the leg: root at the origin, rod along z, TCA 0 at ``phase`` from x.
+
+    Args:
+        spec: The leg.
+        mirrored: Whether the TCAs follow each other clockwise, as in a leg of the other side.
+
+    Returns:
+        A part with the TCAs ``tca0``, ``tca1``, ..., the sites ``tip`` (the end of the rod) and
+        ``foot`` (the middle of the foot), and the geom ``foot``.
+
+    Raises:
+        ValueError: If the geometry cannot be built.
+    """
+    spec = spec or LegSpec()
+    mjspec = new_spec("leg")
+    chain = beam(
+        mjspec.worldbody, spec.body, nodes=spec.nodes, name="rod", motions=spec.motions,
+        rgba=(0.1, 0.1, 0.1, 0.0), collide=False,
+    )  # fmt: skip
+    _dress(chain, spec)
+    _foot(chain, spec)
+    turn = (-2.0 if mirrored else 2.0) * math.pi / spec.count
+    routes = [Helix(spec.offset, phase=spec.phase + turn * i) for i in range(spec.count)]
+    tcas = tuple(
+        route_tca(
+            mjspec,
+            spec.tca.of_length(leg_length(route, spec.length)),
+            route_passes(chain, route),
+            name=f"tca{i}",
+        )
+        for i, route in enumerate(routes)
+    )
+    return Part(mjspec, tcas, {"tip": "tip", "foot": "foot"})
+
+
+def _touching(friction: float) -> dict[str, Any]:
+    """Surface of what touches ground and obstacles, but nothing of the robot."""
+    return {
+        "contype": 0, "conaffinity": 1, "friction": [friction, 0.002, 1e-4], "priority": 1,
+        "solref": [5e-3, 1.0], "solimp": [0.95, 0.99, 5e-4, 0.5, 2.0],
+    }  # fmt: skip
+
+
+def _dress(chain: Chain, spec: LegSpec) -> None:
+    """The rod that is seen, and a plate at the point of each piece."""
+    for number, piece in enumerate(chain.pieces):
+        middle = chain.local(number)
+        whole = chain.piece * (0.5 if number in (0, spec.nodes) else 1.0)
+        piece.add_geom(
+            name=f"rod{number}", type=mujoco.mjtGeom.mjGEOM_CAPSULE,
+            fromto=[0.0, 0.0, 0.0, 0.0, 0.0, whole], size=[spec.rod_diameter / 2.0, 0.0, 0.0],
+            mass=0.0, rgba=[0.12, 0.12, 0.13, 1.0], contype=0, conaffinity=0,
+        )  # fmt: skip
+        for side in range(spec.count):  # a frame with the TCAs' holes in its corners
+            angles = [spec.phase + 2.0 * math.pi * (side + k) / spec.count for k in (0, 1)]
+            ends = [[spec.offset * math.cos(a), spec.offset * math.sin(a), middle] for a in angles]
+            piece.add_geom(
+                name=f"plate{number}.{side}", type=mujoco.mjtGeom.mjGEOM_CAPSULE,
+                fromto=[*ends[0], *ends[1]], size=[spec.plate_thickness, 0.0, 0.0],
+                mass=spec.plate_mass / spec.count, rgba=[0.93, 0.55, 0.15, 1.0],
+                condim=3, **_touching(spec.plate_friction),
+            )  # fmt: skip
+
+
+def _foot(chain: Chain, spec: LegSpec) -> None:
+    """The foot, and the sites ``tip`` and ``foot``."""
+    end = chain.local(spec.nodes)
+    chain.tip.add_geom(
+        name="foot", type=mujoco.mjtGeom.mjGEOM_SPHERE, pos=[0.0, 0.0, end + spec.foot_radius],
+        size=[spec.foot_radius, 0.0, 0.0], mass=spec.foot_mass, rgba=[0.2, 0.22, 0.25, 1.0],
+        condim=4, **_touching(spec.friction),
+    )  # fmt: skip
+    chain.tip.add_site(name="tip", pos=[0.0, 0.0, end], group=4)
+    chain.tip.add_site(name="foot", pos=[0.0, 0.0, end + spec.foot_radius], group=4)

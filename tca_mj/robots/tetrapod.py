@@ -1,0 +1,272 @@
+"""The morphing tetrapod of Sun, Section 6.3.2: three parallel spines, two rails, four legs.
+
+x points forward, y to the left, z up. The spines run across the body from rail to rail; the robot
+bends about the fore-aft axis, from flat to the shape of a U. The tree starts in the middle of the
+spines, so that the model is as symmetric as the robot.
+
+The three spines bend alike, because rigid rails hold their ends. They are therefore one chain whose
+joints all three of them stiffen, each at its own temperature.
+"""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import mujoco
+
+from tca_mj.model.chain import Chain, Motion, beam
+from tca_mj.model.part import Part, new_spec
+from tca_mj.model.spine import lumped_torsion, route_spine
+from tca_mj.model.tendon import Pass, RoutedTca, route_tca
+from tca_mj.modules.leg import LegSpec, continuum_leg
+from tca_mj.rod.beam import BeamSpec, Outline, require_count, require_positive
+from tca_mj.routes import Helix, leg_length
+from tca_mj.smp import HeaterSpec, SpineSpec
+from tca_mj.tca import CATALOGUE, TcaSpec
+
+LEGS = ("front_left", "front_right", "rear_left", "rear_right")
+SIDES = {"left": 1.0, "right": -1.0}  # the sign of y
+SPINES = 3
+
+TUBE_DIAMETER = 2.5e-3  # outer diameter of a spine's silicone tube, half the module's 5 mm [m]
+# Stiffness of what is round a spine (tube, wires) over that of the soft spine. Estimate.
+_SHEATH = 0.01
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class TetrapodSpec:
+    """The robot. Sun prints its length, its height when flat and its speeds; the rest is estimated.
+
+    Attributes:
+        leg: A leg.
+        spine: A spine, as in the morphing module.
+        heater: Heater wire of a spine, fitted to the module's natural cooling.
+        tca: The kind of TCA that bends a spine, cut to twice its length.
+        tca_capacity: Heat capacity of the silicone tube heated with a spine's TCA [J/K]. Estimate.
+        module_mass: Mass of a spine with tube, wires and protrusions, without the TCA [kg].
+            Estimate: 2.2 g of epoxy, 1 g of silicone and 0.3 g of wire.
+        spacing: Fore-aft distance of neighbouring spines [m]. Estimate.
+        memory_angle: Bend of the memorised shape, from rail to rail [rad]. Estimate of "almost
+            flat", Sun, Section 6.3.2.
+        rail_length: Length of a rail [m]. Sun: the robot is about 150 mm long.
+        rail_width: Extent of a rail across the body [m]. Estimate.
+        rail_height: Height of a rail [m]. Estimate.
+        rail_mass: Mass of a rail with the sockets of its legs [kg]. Estimate.
+        leg_station: Fore-aft distance of a leg's root from the middle [m]. Estimate.
+        leg_height: Height of a leg's root above the spines' plane [m]. Estimate: flat, the robot is
+            about 25 mm high.
+        belly_friction: Coefficient of friction of spines and rails. Estimate: printed plastic and
+            epoxy on glass.
+        nodes: Nodes of each half of the spines.
+
+    Raises:
+        ValueError: If a dimension is not finite and positive, or a number not whole.
+    """
+
+    leg: LegSpec = field(default_factory=LegSpec)
+    spine: SpineSpec = field(default_factory=SpineSpec)
+    heater: HeaterSpec = field(default_factory=lambda: HeaterSpec.fitted(SpineSpec()))
+    tca: TcaSpec = field(default_factory=lambda: CATALOGUE["free-stroke"])
+    tca_capacity: float = 0.15
+    module_mass: float = 3.5e-3
+    spacing: float = 40e-3
+    memory_angle: float = math.radians(20.0)
+    rail_length: float = 150e-3
+    rail_width: float = 6e-3
+    rail_height: float = 5e-3
+    rail_mass: float = 3e-3
+    leg_station: float = 62e-3
+    leg_height: float = 6e-3
+    belly_friction: float = 0.3
+    nodes: int = 4
+
+    def __post_init__(self) -> None:
+        require_positive(
+            **{name: getattr(self, name) for name in (
+                "tca_capacity", "module_mass", "spacing", "rail_length", "rail_width",
+                "rail_height", "rail_mass", "leg_station", "leg_height", "belly_friction",
+            )}
+        )  # fmt: skip
+        require_count(nodes=self.nodes)
+        if not -math.pi < self.memory_angle < math.pi:
+            raise ValueError(f"memory_angle must be within -pi and pi, got {self.memory_angle}")
+
+    @property
+    def places(self) -> tuple[float, ...]:
+        """Fore-aft positions of the spines, from the rear one on [m]."""
+        return tuple(self.spacing * (i - (SPINES - 1) / 2) for i in range(SPINES))
+
+    def body(self, *, count: int, length: float, curves: float) -> BeamSpec:
+        """Some of the spines as one beam, but for what shape memory adds.
+
+        Args:
+            count: How many spines.
+            length: Length of the beam [m].
+            curves: -1 if the beam of the memorised shape bends towards its y axis, else 1.
+        """
+        soft = _SHEATH * count * self.spine.smp.rubbery * self.spine.second_moment
+        half_width = self.spine.width / 2.0 if count == 1 else self.spacing + self.spine.width
+        return BeamSpec(
+            length=length,
+            bending=(soft, soft),
+            torsion=soft,
+            stretching=soft / self.spine.thickness**2,
+            shearing=soft / self.spine.thickness**2,
+            line_density=count * self.module_mass / self.spine.length,
+            outline=Outline(half_width, self.spine.module_height, round=False),
+            curvature=(curves * self.memory_angle / self.spine.length, 0.0, 0.0),
+        )
+
+
+def tetrapod(spec: TetrapodSpec | None = None) -> Part:
+    """Builds the robot: the middle of the spines at the origin, on a free joint ``root``.
+
+    Returns:
+        A part with the TCAs ``<leg>.tca0`` (lifts the leg), ``<leg>.tca1`` (front, down) and
+        ``<leg>.tca2`` (rear, down) for each of ``LEGS``, then ``spine0`` (rear) to ``spine2``;
+        the spines ``spine0`` to ``spine2``; and the sites ``<leg>.foot`` and ``<leg>.tip``.
+
+    Raises:
+        ValueError: If the geometry cannot be built.
+    """
+    spec = spec or TetrapodSpec()
+    mjspec = new_spec("tetrapod")
+    hub = mjspec.worldbody.add_body(name="hub")
+    hub.add_freejoint(name="root")
+    part = Part(mjspec)
+    halves = {}
+    for side, sign in SIDES.items():
+        halves[side] = add_half(
+            hub, spec, side, count=SPINES, nodes=spec.nodes, motions=("bend_x", "twist")
+        )
+        dress(halves[side], spec, down=sign, places=dict(enumerate(spec.places)))
+        add_rail(halves[side], spec, sign)
+    attach_legs(part, spec.leg)
+    torsion = 2 * lumped_torsion(spec.spine, spec.places, 2 * spec.nodes)[spec.nodes :]
+    for i, x in enumerate(spec.places):
+        name = f"spine{i}"
+        part.tcas += (route_spine_tca(mjspec, halves, spec, x, name),)
+        part.spines += (
+            route_spine(
+                spec.spine, spec.heater, list(halves.values()), name=name, tca=name, torsion=torsion
+            ),
+        )
+    return part
+
+
+def add_half(
+    hub: mujoco.MjsBody,
+    spec: TetrapodSpec,
+    side: str,
+    *,
+    count: int,
+    nodes: int,
+    motions: Sequence[Motion],
+) -> Chain:
+    """Half of ``count`` spines as one chain, from the hub to the rail of ``side``.
+
+    The chain's x axis points forward; its y axis points down in the left half, up in the right.
+    """
+    sign = SIDES[side]
+    return beam(
+        hub, spec.body(count=count, length=spec.spine.length / 2.0, curves=-sign), nodes=nodes,
+        name=side, motions=motions, quat=(math.sqrt(0.5), -sign * math.sqrt(0.5), 0.0, 0.0),
+        rgba=(0.0, 0.0, 0.0, 0.0), collide=False,
+    )  # fmt: skip
+
+
+def attach_legs(part: Part, leg: LegSpec) -> None:
+    """Attaches a leg to each of the rails' four sites; their TCAs in the order of ``LEGS``."""
+    for side in SIDES:
+        for place in ("front", "rear"):
+            child = continuum_leg(leg, mirrored=side == "right")
+            part.attach(child, to=f"{side}.{place}", prefix=f"{place}_{side}")
+    order = {name: i for i, name in enumerate(LEGS)}
+    part.tcas = tuple(sorted(part.tcas, key=lambda tca: order[tca.name.split(".")[0]]))
+
+
+def dress(chain: Chain, spec: TetrapodSpec, *, down: float, places: Mapping[int, float]) -> None:
+    """What of spines is seen and touched, tube below and polymer above.
+
+    Args:
+        chain: The chain.
+        spec: The robot.
+        down: 1 if the chain's y axis points down, -1 if up.
+        places: x in the chain of each spine, by its number [m].
+    """
+    size, tube = spec.spine, spec.spine.module_height - spec.spine.thickness
+    for number, piece in enumerate(chain.pieces):
+        whole = chain.piece * (0.5 if number in (0, chain.nodes) else 1.0)
+        for i, x in places.items():
+            piece.add_geom(
+                name=f"{chain.name}.spine{i}.{number}", type=mujoco.mjtGeom.mjGEOM_BOX,
+                pos=[x, 0.0, whole / 2.0],
+                size=[size.width / 2.0, size.thickness / 2.0, whole / 2.0],
+                mass=0.0, rgba=[0.86, 0.78, 0.52, 1.0], **_touching(spec.belly_friction),
+            )  # fmt: skip
+            piece.add_geom(
+                name=f"{chain.name}.tube{i}.{number}", type=mujoco.mjtGeom.mjGEOM_BOX,
+                pos=[x, down * spec.spine.module_height / 2.0, whole / 2.0],
+                size=[size.width / 2.0, tube / 2.0, whole / 2.0],
+                mass=0.0, rgba=[0.9, 0.9, 0.88, 0.6], **_touching(spec.belly_friction),
+            )  # fmt: skip
+
+
+def _touching(friction: float) -> dict[str, Any]:
+    """Surface of what touches ground and obstacles, but nothing of the robot."""
+    return {
+        "contype": 0, "conaffinity": 1, "condim": 3, "priority": 1,
+        "friction": [friction, 0.002, 1e-4], "solref": [5e-3, 1.0],
+        "solimp": [0.95, 0.99, 5e-4, 0.5, 2.0],
+    }  # fmt: skip
+
+
+def add_rail(chain: Chain, spec: TetrapodSpec, sign: float) -> None:
+    """A rail at the end of a half, with the sites ``<side>.front`` and ``<side>.rear`` for legs."""
+    tip, end = chain.tip, chain.local(chain.nodes)
+    middle, up = end + spec.rail_width / 2.0, -sign  # of the chain's y axis
+    grey = [0.25, 0.3, 0.36, 1.0]
+    tip.add_geom(
+        name=f"{chain.name}.rail", type=mujoco.mjtGeom.mjGEOM_BOX, pos=[0.0, 0.0, middle],
+        size=[spec.rail_length / 2.0, spec.rail_height / 2.0, spec.rail_width / 2.0],
+        mass=spec.rail_mass, rgba=grey, **_touching(spec.belly_friction),
+    )  # fmt: skip
+    # The leg's z axis points outwards, x up.
+    turn = -sign * math.pi / 4.0
+    for place, x in (("front", spec.leg_station), ("rear", -spec.leg_station)):
+        tip.add_geom(
+            name=f"{chain.name}.{place}.socket", type=mujoco.mjtGeom.mjGEOM_BOX,
+            pos=[x, up * spec.leg_height / 2.0, middle],
+            size=[4e-3, (spec.leg_height + spec.rail_height) / 2.0, spec.rail_width / 2.0],
+            contype=0, conaffinity=0, mass=0.0, rgba=grey,
+        )  # fmt: skip
+        tip.add_site(
+            name=f"{chain.name}.{place}", group=4,
+            pos=[x, up * spec.leg_height, end + spec.rail_width],
+            quat=[math.cos(turn), 0.0, 0.0, math.sin(turn)],
+        )  # fmt: skip
+
+
+def route_spine_tca(
+    mjspec: mujoco.MjSpec, halves: Mapping[str, Chain], spec: TetrapodSpec, x: float, name: str
+) -> RoutedTca:
+    """The U-shaped TCA below the spine at ``x``: from rail to rail and back."""
+    passes = []
+    for out, sides in ((1.0, ("right", "left")), (-1.0, ("left", "right"))):
+        for side in sides:
+            place = x + out * spec.spine.width / 4.0
+            below = SIDES[side] * spec.spine.tca_offset
+            leg = Helix(math.hypot(place, below), phase=math.atan2(below, place))
+            passes.append(Pass(halves[side], leg, down=side == sides[0]))
+    return route_tca(mjspec, sheathed(spec, passes), passes, name=name)
+
+
+def sheathed(spec: TetrapodSpec, passes: Sequence[Pass]) -> TcaSpec:
+    """The TCA that follows passes, in its tube."""
+    length = sum(leg_length(p.leg, p.chain.beam.length, p.chain.beam.curvature) for p in passes)
+    return replace(
+        spec.tca.of_length(length),
+        sheath_capacity=spec.tca_capacity,
+        sheath_area=math.pi * TUBE_DIAMETER * length,
+    )

@@ -1,0 +1,101 @@
+"""A finer model of the tetrapod, which tells what the model that is used leaves out.
+
+Each of the three spines is a chain of its own that bends about both axes, twists and stretches, and
+the legs twist. The middle spine is in the tree. The other two start at the right rail, and welds
+close them at the left one. It has several times the degrees of freedom and is for comparisons.
+"""
+
+import math
+from dataclasses import replace
+
+import mujoco
+import numpy as np
+
+from tca_mj.model.chain import MOTIONS, Chain, Motion, beam
+from tca_mj.model.part import Part, new_spec
+from tca_mj.model.spine import route_spine
+from tca_mj.model.tendon import route_passes, route_tca
+from tca_mj.robots.tetrapod import (
+    SIDES,
+    TetrapodSpec,
+    add_half,
+    add_rail,
+    attach_legs,
+    dress,
+    route_spine_tca,
+    sheathed,
+)
+from tca_mj.routes import UTurn
+
+_LEG_MOTIONS: tuple[Motion, ...] = ("bend_x", "bend_y", "twist")
+
+# The welds hardly give: MuJoCo's default is softer than the spines in their plane. It takes a time
+# constant that is so short only with its flag ``refsafe`` disabled, else two time steps.
+_SOLREF = (2e-4, 1.0)
+_SOLIMP = (0.999, 0.9999, 1e-4, 0.5, 2.0)
+
+
+def fine_tetrapod(spec: TetrapodSpec | None = None, *, nodes: int = 6, leg_nodes: int = 10) -> Part:
+    """Builds the robot of ``tetrapod`` with more degrees of freedom; names are the same.
+
+    Args:
+        spec: The robot, but for its numbers of nodes and the motions of its legs.
+        nodes: Nodes of each half of each spine.
+        leg_nodes: Nodes of each leg.
+
+    Returns:
+        A part with the TCAs, spines and sites of ``tetrapod``. The chains of the spines are
+        ``left`` and ``right`` for the halves of the middle one, ``outer0`` and ``outer2`` for the
+        others.
+
+    Raises:
+        ValueError: If the geometry cannot be built.
+    """
+    spec = spec or TetrapodSpec()
+    mjspec = new_spec("tetrapod")
+    hub = mjspec.worldbody.add_body(name="hub")
+    hub.add_freejoint(name="root")
+    halves = {}
+    for side, sign in SIDES.items():
+        halves[side] = add_half(hub, spec, side, count=1, nodes=nodes, motions=MOTIONS)
+        dress(halves[side], spec, down=sign, places={1: 0.0})
+        add_rail(halves[side], spec, sign)
+    outer = {i: _outer(mjspec, halves, spec, i) for i in (0, 2)}
+    part = Part(mjspec)
+    attach_legs(part, replace(spec.leg, nodes=leg_nodes, motions=_LEG_MOTIONS))
+    for i in range(len(spec.places)):
+        name = f"spine{i}"
+        if i in outer:
+            chains = [outer[i]]
+            route = UTurn.parallel(spec.spine.tca_offset, spec.spine.width / 4.0, math.pi / 2.0)
+            passes = route_passes(outer[i], route)
+            part.tcas += (route_tca(mjspec, sheathed(spec, passes), passes, name=name),)
+        else:
+            chains = list(halves.values())
+            part.tcas += (route_spine_tca(mjspec, halves, spec, 0.0, name),)
+        part.spines += (route_spine(spec.spine, spec.heater, chains, name=name, tca=name),)
+    return part
+
+
+def _outer(
+    mjspec: mujoco.MjSpec, halves: dict[str, Chain], spec: TetrapodSpec, number: int
+) -> Chain:
+    """The whole spine ``number``, from the right rail to a weld at the left one."""
+    right, left = halves["right"], halves["left"]
+    x, name = spec.places[number], f"outer{number}"
+    chain = beam(
+        right.tip, spec.body(count=1, length=spec.spine.length, curves=-1.0),
+        nodes=2 * right.nodes, name=name, motions=MOTIONS,
+        pos=(x, 0.0, right.local(right.nodes)), quat=(0.0, 1.0, 0.0, 0.0),
+        rgba=(0.0, 0.0, 0.0, 0.0), collide=False,
+    )  # fmt: skip
+    dress(chain, spec, down=1.0, places={number: 0.0})
+    weld = mjspec.add_equality(name=name)
+    weld.type = mujoco.mjtEq.mjEQ_WELD
+    weld.objtype = mujoco.mjtObj.mjOBJ_BODY
+    weld.name1, weld.name2 = left.tip.name, chain.tip.name
+    data = np.zeros(len(weld.data))  # zeros: as they are when all joints are at 0, in line
+    data[10] = 1.0  # m/rad by which errors of the rotation count
+    weld.data = data
+    weld.solref, weld.solimp = _SOLREF, _SOLIMP
+    return chain

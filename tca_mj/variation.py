@@ -1,0 +1,136 @@
+"""How far a robot differs from its description: friction, mass, muscle gain, heat loss, ambient.
+
+What is learned or tuned on one robot has to work on the next, whose figures are a few per cent
+off. ``Nominal`` keeps the figures that a simulation was built with and scales from them, never
+from what it scaled before: applying twice is applying once, and factors of one bring back the
+simulation as it was built, bit for bit.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, replace
+from typing import TypeVar
+
+import numpy as np
+
+from tca_mj.sim import Simulation
+from tca_mj.smp import HeaterSpec
+from tca_mj.tca import HeatSpec
+
+Heat = TypeVar("Heat", HeatSpec, HeaterSpec)
+
+AMBIENT = 25.0  # temperature of the surroundings if nothing is said [°C]
+AMBIENT_SPREAD = 25.0  # what a spread of 1 means for it [K]
+
+# Arrays of a model that are proportional to all masses, to their inverse, and to friction. The
+# inverse ones, which MuJoCo takes at compilation, set how soft contacts and limits are.
+_MASSES = ("body_mass", "body_inertia", "body_subtreemass", "dof_M0")
+_INVERSE = ("body_invweight0", "dof_invweight0", "tendon_invweight0")
+_FRICTION = ("geom_friction",)
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Variation:
+    """Factors over what a simulation was built with, and the temperature of its surroundings.
+
+    Attributes:
+        friction: Of all coefficients of friction [1].
+        mass: Of all masses and inertias [1].
+        tca_gain: Of the tension of every TCA, and so of its slope [1].
+        heat_loss: Of the heat that TCAs and spines lose per excess temperature [1].
+        ambient: Temperature of the surroundings, at which everything starts [°C].
+
+    Raises:
+        ValueError: If a factor is not finite and positive, or the temperature not above absolute
+            zero.
+    """
+
+    friction: float = 1.0
+    mass: float = 1.0
+    tca_gain: float = 1.0
+    heat_loss: float = 1.0
+    ambient: float = AMBIENT
+
+    def __post_init__(self) -> None:
+        for name in ("friction", "mass", "tca_gain", "heat_loss"):
+            value = getattr(self, name)
+            if not 0.0 < value < math.inf:
+                raise ValueError(f"{name} must be finite and above 0, got {value}")
+        if not -273.15 < self.ambient < math.inf:
+            raise ValueError(f"ambient must be finite and above -273.15 °C, got {self.ambient}")
+
+    @classmethod
+    def names(cls) -> tuple[str, ...]:
+        """Names of the fields, in the order of ``drawn``."""
+        return tuple(field.name for field in fields(cls))
+
+    @classmethod
+    def drawn(cls, draws: Sequence[float], spread: float) -> "Variation":
+        """A variation from one uniform draw for each field.
+
+        Args:
+            draws: Numbers between -1 and 1, one for each of ``names``.
+            spread: Factors are 1 + spread times a draw, the ambient temperature is 25 °C + 25 K
+                times spread times the last one; at least 0 and below 1.
+
+        Raises:
+            ValueError: If numbers are missing or out of range.
+        """
+        if len(draws) != len(cls.names()) or not all(-1.0 <= draw <= 1.0 for draw in draws):
+            raise ValueError(f"draws must be {len(cls.names())} within -1 and 1, got {draws}")
+        if not 0.0 <= spread < 1.0:
+            raise ValueError(f"spread must be at least 0 and below 1, got {spread}")
+        *factors, last = (spread * float(draw) for draw in draws)
+        friction, mass, tca_gain, heat_loss = (1.0 + factor for factor in factors)
+        return cls(
+            friction=friction,
+            mass=mass,
+            tca_gain=tca_gain,
+            heat_loss=heat_loss,
+            ambient=AMBIENT + AMBIENT_SPREAD * last,
+        )
+
+
+class Nominal:
+    """What a simulation was built with.
+
+    Attributes:
+        variation: What was applied last.
+    """
+
+    def __init__(self, sim: Simulation) -> None:
+        """Keeps the figures of ``sim``, to which no variation has been applied."""
+        self._sim = sim
+        self._figures = {
+            name: getattr(sim.model, name).copy() for name in _MASSES + _INVERSE + _FRICTION
+        }
+        self._heat = sim.bank.heat
+        self._heater = sim.spines.bank.heater if sim.spines.n else None
+        self._gain = sim.gain
+        self.variation = Variation()
+
+    def apply(self, variation: Variation) -> None:
+        """Makes the simulation that of a robot that is off by ``variation``.
+
+        To be followed by ``Simulation.reset``: the temperatures and tensions that the simulation
+        has at the moment are those of before.
+        """
+        sim, model = self._sim, self._sim.model
+        for names, factor in (
+            (_MASSES, variation.mass),
+            (_INVERSE, 1.0 / variation.mass),
+            (_FRICTION, variation.friction),
+        ):
+            for name in names:
+                getattr(model, name)[:] = factor * self._figures[name]
+        sim.gain = self._gain * variation.tca_gain
+        loss, ambient = variation.heat_loss, variation.ambient
+        sim.bank.heat = _varied(self._heat, loss, ambient)
+        if self._heater is not None:
+            sim.spines.bank.heater = _varied(self._heater, loss, ambient)
+        self.variation = variation
+
+
+def _varied(heat: Heat, factor: float, ambient: float) -> Heat:
+    loss = factor * np.asarray(heat.loss)
+    return replace(heat, loss=loss, ambient=np.full_like(loss, ambient))
