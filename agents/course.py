@@ -71,12 +71,12 @@ def stages(places: Places) -> tuple[Go | Bend, ...]:
     return (
         Go(name="crawl", gait=CRAWL, until=places.stand, steers=0.0),
         Bend(name="stand up", angle=walking, steps=STEP),
-        Go(name="walk", gait=WALK, until=places.first_edge - station, steers=0.0),
-        # The front feet have left the desk, the rear ones push on.
+        # On until the front feet have left the desk wherever they swing; then the rear ones push.
+        Go(name="walk", gait=WALK, until=places.first_edge - station + 0.02, steers=0.0),
         Go(name="mount", gait=PUSH, until=places.first_edge + station + 0.006, patience=150.0),
         Bend(name="clamp", angle=np.radians(208.0)),
         # On until the rear spine has left the beam, too; the front legs stand on the desk by then.
-        Go(name="shimmy", gait=SHIMMY, until=places.beam_end + station - 0.016, patience=320.0),
+        Go(name="shimmy", gait=SHIMMY, until=places.beam_end + station - 0.016, patience=900.0),
         Bend(name="open", angle=walking, steps=STEP),
         Go(name="walk on", gait=WALK, until=places.target, steers=0.0),
         Bend(name="lie down", angle=None),

@@ -271,10 +271,10 @@ class _Stopwatch:
         else:
             delattr(self._owner, self._name)
 
-    def _timed(self, *arguments: Any) -> Any:
+    def _timed(self, *arguments: Any, **named: Any) -> Any:
         start = time.thread_time()
         try:
-            return self.plain(*arguments)
+            return self.plain(*arguments, **named)
         finally:
             self.seconds += time.thread_time() - start
 
