@@ -4,21 +4,17 @@ import math
 from collections.abc import Mapping
 from typing import Any, ClassVar
 
-import gymnasium as gym
 import mujoco
 import numpy as np
 from dm_control.utils import rewards
 from numpy.typing import ArrayLike, NDArray
 
 from tca_mj.assets import mjcf
+from tca_mj.envs.base import Action, Observation, SimulatedTask
 from tca_mj.envs.table import Entry, Table, numbers
 from tca_mj.model.scene import scene
-from tca_mj.render import Offscreen, colour_tendons
 from tca_mj.robots.arm import ArmSpec, arm
 from tca_mj.sim import Simulation, SimulationDiverged
-
-Observation = NDArray[np.float32]
-Action = NDArray[np.float32]
 
 # Objects, with the width that the gripper has to reach round [m].
 OBJECTS = {"screwdriver": 8e-3, "pcb": 3.6e-3}
@@ -54,7 +50,7 @@ _HANGING = np.array([1.0, -1.0, -1.0] * 3)
 _CUP_RADIUS, _CUP_RIM = 12.5e-3, 16e-3  # of assets/mjcf/cup.xml [m]
 
 
-class ArmPickPlace(gym.Env[Observation, Action]):
+class ArmPickPlace(SimulatedTask):
     """Pick up an object under the arm and lay it into a cup.
 
     The arm hangs from a base that moves up and down. It senses its own TCAs and sees the object
@@ -91,7 +87,6 @@ class ArmPickPlace(gym.Env[Observation, Action]):
     the simulation diverged.
     """
 
-    metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 10}
     max_power: ClassVar[NDArray[np.float64]] = np.array([2.0, 2.0, 2.0, 28.0, 10.0])  # [W]
     max_temperature = 180.0  # annealing temperature of the TCAs, Sun, Table 2.1 [°C]
     control_period = 0.1  # [s]
@@ -146,7 +141,6 @@ class ArmPickPlace(gym.Env[Observation, Action]):
         self.observation_space = OBSERVATION.space
         self.action_space = ACTION.space
         self._camera, self._size = camera, size
-        self._screen: Offscreen | None = None
         self.object = "screwdriver"
         self._in_cup, self._carried = 0, False
         self._find(self.model)
@@ -166,22 +160,6 @@ class ArmPickPlace(gym.Env[Observation, Action]):
         self._cup = int(model.body("cup.cup").mocapid[0])
         names = [model.body(int(b)).name for b in model.geom_bodyid]
         self._is_arm = np.array([name.startswith("arm.") for name in names])
-
-    # What tools that know Gymnasium's own MuJoCo environments look for.
-    @property
-    def model(self) -> mujoco.MjModel:
-        """The compiled model."""
-        return self.sim.model
-
-    @property
-    def data(self) -> mujoco.MjData:
-        """MuJoCo's state."""
-        return self.sim.data
-
-    @property
-    def dt(self) -> float:
-        """Time of one step [s]."""
-        return self.control_period
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -379,27 +357,3 @@ class ArmPickPlace(gym.Env[Observation, Action]):
             "temperature": sim.temperature.copy(),
             "tension": sim.tension.copy(),
         }
-
-    def render(self) -> NDArray[np.uint8] | None:
-        """A picture of the scene, shape (height, width, 3), or None without a render mode.
-
-        Raises:
-            RenderingUnavailable: If there is no OpenGL.
-        """
-        if self.render_mode is None:
-            return None
-        if self._screen is None:
-            width, height = self._size
-            self._screen = Offscreen(self.model, width=width, height=height, camera=self._camera)
-        colour_tendons(self.model, self.sim.tendon, self.sim.temperature)
-        return self._screen.draw(self.data)
-
-    def __getstate__(self) -> dict[str, Any]:
-        """Everything but the window: a copy goes on where this one is."""
-        return self.__dict__ | {"_screen": None}
-
-    def close(self) -> None:
-        """Frees what rendering took."""
-        if self._screen is not None:
-            self._screen.close()
-            self._screen = None

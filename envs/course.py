@@ -3,22 +3,18 @@
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-import gymnasium as gym
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
 from tca_mj.assets import mjcf
+from tca_mj.envs.base import Action, Observation, SimulatedTask
 from tca_mj.envs.stance import CAMERAS as FOLLOWING
 from tca_mj.envs.stance import tetrapod_scene
 from tca_mj.envs.table import Entry, Table, numbers
-from tca_mj.render import Offscreen, colour_tendons
 from tca_mj.robots.tetrapod import LEGS, SPINES, TetrapodSpec
 from tca_mj.sim import SimulationDiverged
 from tca_mj.smp import HeaterSpec, SpineSpec
-
-Observation = NDArray[np.float32]
-Action = NDArray[np.float32]
 
 CAMERAS = (*FOLLOWING, "overview")
 TCAS = 3 * len(LEGS) + SPINES
@@ -78,7 +74,7 @@ class Places:
     leg_station: float
 
 
-class TetrapodCourse(gym.Env[Observation, Action]):
+class TetrapodCourse(SimulatedTask):
     """The whole course with one robot that changes its shape on the way.
 
     Crawl under a plate 30 mm above the desk, stand up, walk astride a beam until it bridges the
@@ -111,7 +107,6 @@ class TetrapodCourse(gym.Env[Observation, Action]):
     TCA is too hot or torn, or if the simulation diverged.
     """
 
-    metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 10}
     max_power: ClassVar[NDArray[np.float64]] = np.array([4.0] * 12 + [40.0] * 3)  # [W]
     max_voltage = 25.0  # Sun, Section 6.1.3 [V]
     max_temperature = 180.0  # annealing temperature of the TCAs, Sun, Table 2.1 [°C]
@@ -165,7 +160,6 @@ class TetrapodCourse(gym.Env[Observation, Action]):
         self.observation_space = OBSERVATION.space
         self.action_space = ACTION.space
         self._camera, self._size = camera, size
-        self._screen: Offscreen | None = None
         self._find(self.model)
         self._setup: dict[str, Any] = {}
         self.touched = False
@@ -200,22 +194,6 @@ class TetrapodCourse(gym.Env[Observation, Action]):
             target_size=(float(target.size[0]), float(target.size[1])),
             leg_station=self.robot.leg_station,
         )
-
-    # What tools that know Gymnasium's own MuJoCo environments look for.
-    @property
-    def model(self) -> mujoco.MjModel:
-        """The compiled model."""
-        return self.sim.model
-
-    @property
-    def data(self) -> mujoco.MjData:
-        """MuJoCo's state."""
-        return self.sim.data
-
-    @property
-    def dt(self) -> float:
-        """Time of one step [s]."""
-        return self.control_period
 
     @property
     def position(self) -> NDArray[np.float64]:
@@ -396,27 +374,3 @@ class TetrapodCourse(gym.Env[Observation, Action]):
             "position": self.position.copy(),
             "friction": float(self._setup.get("friction", 1.0)),
         }
-
-    def render(self) -> NDArray[np.uint8] | None:
-        """A picture of the scene, shape (height, width, 3), or None without a render mode.
-
-        Raises:
-            RenderingUnavailable: If there is no OpenGL.
-        """
-        if self.render_mode is None:
-            return None
-        if self._screen is None:
-            width, height = self._size
-            self._screen = Offscreen(self.model, width=width, height=height, camera=self._camera)
-        colour_tendons(self.model, self.sim.tendon, self.sim.temperature)
-        return self._screen.draw(self.data)
-
-    def __getstate__(self) -> dict[str, Any]:
-        """Everything but the window: a copy goes on where this one is."""
-        return self.__dict__ | {"_screen": None}
-
-    def close(self) -> None:
-        """Frees what rendering took."""
-        if self._screen is not None:
-            self._screen.close()
-            self._screen = None

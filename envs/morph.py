@@ -4,22 +4,18 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-import gymnasium as gym
 import mujoco
 import numpy as np
 from dm_control.utils import rewards
-from numpy.typing import NDArray
 
 from tca_mj.assets import mjcf
+from tca_mj.envs.base import Action, Observation, SimulatedTask
 from tca_mj.envs.table import Entry, Table, numbers
 from tca_mj.model.part import Part, new_spec
 from tca_mj.model.scene import scene
 from tca_mj.modules.morphing import MorphingSpec, morphing_module
-from tca_mj.render import Offscreen, colour_tendons
+from tca_mj.render import colour_tendons
 from tca_mj.sim import Simulation, SimulationDiverged
-
-Observation = NDArray[np.float32]
-Action = NDArray[np.float32]
 
 CAMERAS = ("front", "side")
 
@@ -51,7 +47,7 @@ _COLD, _HOT = np.array([0.86, 0.74, 0.48]), np.array([0.90, 0.25, 0.12])  # of t
 _APART = math.radians(20.0)  # least distance of a drawn start from the goal [rad]
 
 
-class MorphModule(gym.Env[Observation, Action]):
+class MorphModule(SimulatedTask):
     """Bend a module with a shape-memory spine to an angle, so that it stays there unpowered.
 
     The module hangs from a clamp and bends in a vertical plane. Heated, its spine is soft, its
@@ -87,7 +83,6 @@ class MorphModule(gym.Env[Observation, Action]):
     the simulation diverged.
     """
 
-    metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 10}
     max_voltage = 25.0  # Sun, Section 6.1.3 [V]
     max_power = 40.0  # about 25 V at the TCA, Sun, Section 6.2.1 [W]
     max_temperature = 180.0  # annealing temperature of the TCA, Sun, Table 2.1 [°C]
@@ -141,8 +136,7 @@ class MorphModule(gym.Env[Observation, Action]):
         self.sim = Simulation(part, timestep=timestep, tca_period=self.control_period)
         self.observation_space = OBSERVATION.space
         self.action_space = ACTION.space
-        self._camera, self._size = camera, size
-        self._screen: Offscreen | None = None
+        self._camera, self._size = f"stand.{camera}", size
         self.target = self.target_range[1]
         self._at_goal = 0
         self._find(self.model, part)
@@ -156,22 +150,6 @@ class MorphModule(gym.Env[Observation, Action]):
         self._bend_q, self._bend_v = model.jnt_qposadr[joints], model.jnt_dofadr[joints]
         geoms = [model.geom(i).name for i in range(model.ngeom)]
         self._polymer = np.flatnonzero([".polymer" in name for name in geoms])
-
-    # What tools that know Gymnasium's own MuJoCo environments look for.
-    @property
-    def model(self) -> mujoco.MjModel:
-        """The compiled model."""
-        return self.sim.model
-
-    @property
-    def data(self) -> mujoco.MjData:
-        """MuJoCo's state."""
-        return self.sim.data
-
-    @property
-    def dt(self) -> float:
-        """Time of one step [s]."""
-        return self.control_period
 
     @property
     def angle(self) -> float:
@@ -339,38 +317,12 @@ class MorphModule(gym.Env[Observation, Action]):
             "damaged": bool(sim.spines.damaged.any()),
         }
 
-    def render(self) -> NDArray[np.uint8] | None:
-        """A picture of the scene, shape (height, width, 3), or None without a render mode.
-
-        Raises:
-            RenderingUnavailable: If there is no OpenGL.
-        """
-        if self.render_mode is None:
-            return None
-        if self._screen is None:
-            width, height = self._size
-            self._screen = Offscreen(
-                self.model, width=width, height=height, camera=f"stand.{self._camera}"
-            )
-        self.paint()
-        return self._screen.draw(self.data)
-
     def paint(self) -> None:
         """Gives TCA and spine the colours of their temperatures; no physics reads them."""
         model, sim = self.model, self.sim
         colour_tendons(model, sim.tendon, sim.temperature)
         heat = np.clip((sim.spines.temperature[0] - 25.0) / 95.0, 0.0, 1.0)
         model.geom_rgba[self._polymer, :3] = _COLD + heat * (_HOT - _COLD)
-
-    def __getstate__(self) -> dict[str, Any]:
-        """Everything but the window: a copy goes on where this one is."""
-        return self.__dict__ | {"_screen": None}
-
-    def close(self) -> None:
-        """Frees what rendering took."""
-        if self._screen is not None:
-            self._screen.close()
-            self._screen = None
 
 
 def hanging_module(spec: MorphingSpec) -> Part:

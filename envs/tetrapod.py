@@ -5,21 +5,15 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from typing import Any, ClassVar
 
-import gymnasium as gym
-import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
 from tca_mj.assets import mjcf
+from tca_mj.envs.base import Action, Observation, SimulatedTask
 from tca_mj.envs.stance import CAMERAS, LEG_TCAS, Stance, tetrapod_scene
 from tca_mj.envs.table import Entry, Table, numbers
-from tca_mj.render import Offscreen, colour_tendons
 from tca_mj.robots.tetrapod import TetrapodSpec
 from tca_mj.sim import SimulationDiverged
 from tca_mj.variation import Nominal, Variation
-
-Observation = NDArray[np.float32]
-Action = NDArray[np.float32]
 
 OBSERVATION = Table(
     [
@@ -69,7 +63,7 @@ _UPRIGHT = 0.5  # cosine of the tilt from which on it has fallen over
 _SUNK = 12e-3  # depth below its first height at which it has fallen off the beam [m]
 
 
-class TetrapodGait(gym.Env[Observation, Action]):
+class TetrapodGait(SimulatedTask):
     """Get on in a commanded direction, cold and rigid in one shape, by the legs alone.
 
     The morphing tetrapod crawls flat, walks with its body bent to a right angle, or shimmies along
@@ -110,7 +104,6 @@ class TetrapodGait(gym.Env[Observation, Action]):
     torn, or if the simulation diverged.
     """
 
-    metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 10}
     max_power: ClassVar[float] = 4.0  # of each TCA of a leg [W]
     max_temperature: ClassVar[float] = 180.0  # annealing temperature, Sun, Table 2.1 [°C]
     hot_temperature: ClassVar[float] = 172.0  # from here on heat is charged [°C]
@@ -166,26 +159,9 @@ class TetrapodGait(gym.Env[Observation, Action]):
         self.action_space = ACTION.space
         self._nominal = Nominal(self.sim)
         self._camera, self._size = camera, size
-        self._screen: Offscreen | None = None
         self._forward = np.array([1.0, 0.0])
         self._start = np.zeros(3)
         self._progress = self._judge()
-
-    # What tools that know Gymnasium's own MuJoCo environments look for.
-    @property
-    def model(self) -> mujoco.MjModel:
-        """The compiled model."""
-        return self.sim.model
-
-    @property
-    def data(self) -> mujoco.MjData:
-        """MuJoCo's state."""
-        return self.sim.data
-
-    @property
-    def dt(self) -> float:
-        """Time of one step [s]."""
-        return self.control_period
 
     @property
     def variation(self) -> Variation:
@@ -361,27 +337,3 @@ class TetrapodGait(gym.Env[Observation, Action]):
             "tension": sim.tension.copy(),
             "variation": asdict(self.variation),
         }
-
-    def render(self) -> NDArray[np.uint8] | None:
-        """A picture of the scene, shape (height, width, 3), or None without a render mode.
-
-        Raises:
-            RenderingUnavailable: If there is no OpenGL.
-        """
-        if self.render_mode is None:
-            return None
-        if self._screen is None:
-            width, height = self._size
-            self._screen = Offscreen(self.model, width=width, height=height, camera=self._camera)
-        colour_tendons(self.model, self.sim.tendon, self.sim.temperature)
-        return self._screen.draw(self.data)
-
-    def __getstate__(self) -> dict[str, Any]:
-        """Everything but the window: a copy goes on where this one is."""
-        return self.__dict__ | {"_screen": None}
-
-    def close(self) -> None:
-        """Frees what rendering took."""
-        if self._screen is not None:
-            self._screen.close()
-            self._screen = None
