@@ -2,6 +2,7 @@
 
 from tca_mj.tca.bank import Pull, TcaBank, TcaState
 from tca_mj.tca.calibration import calibrate
+from tca_mj.tca.catalogue import MODULE_TCAS
 from tca_mj.tca.centreline import CONICAL, Centreline, ConicalTca
 from tca_mj.tca.coilbvp import FibreShape, Stiffness, fibre_stiffness, solve_fibre
 from tca_mj.tca.coilrod import CoilRods, CoilSolveError, Helix, coil_tension
@@ -20,6 +21,7 @@ from tca_mj.tca.thermal import HeatSpec, heat_lost, power_from_voltage, step_tem
 __all__ = [
     "CATALOGUE",
     "CONICAL",
+    "MODULE_TCAS",
     "CalibrationError",
     "Centreline",
     "CoilRods",
