@@ -40,6 +40,7 @@ class Go:
         patience: Time after which the stage ends wherever the body is [s].
         steers: Deviation of the heading up to which nothing is done; beyond it the legs of one side
             become weaker. None: never [rad].
+        pushes: Which legs follow the gait; the others are cold.
     """
 
     name: str
@@ -47,6 +48,7 @@ class Go:
     until: float
     patience: float = math.inf
     steers: float | None = None
+    pushes: tuple[bool, bool, bool, bool] = (True,) * 4
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -75,8 +77,12 @@ def stages(places: Places) -> tuple[Go | Bend, ...]:
         Go(name="walk", gait=WALK, until=places.first_edge - station + 0.02, steers=0.0),
         Go(name="mount", gait=PUSH, until=places.first_edge + station + 0.006, patience=150.0),
         Bend(name="clamp", angle=np.radians(208.0)),
-        # On until the rear spine has left the beam, too; the front legs stand on the desk by then.
-        Go(name="shimmy", gait=SHIMMY, until=places.beam_end + station - 0.016, patience=900.0),
+        Go(name="shimmy", gait=SHIMMY, until=places.beam_end - 0.005, patience=500.0),
+        # On until the rear spine has left the beam; the front legs, on the desk by then, are cold.
+        Go(
+            name="step off", gait=SHIMMY, until=places.beam_end + station - 0.017, patience=200.0,
+            pushes=(False, False, True, True),
+        ),  # fmt: skip
         Bend(name="open", angle=walking, steps=STEP),
         Go(name="walk on", gait=WALK, until=places.target, steers=0.0),
         Bend(name="lie down", angle=None),
@@ -152,6 +158,7 @@ class CourseWalker:
             weaker = np.clip(600.0 * away, -80.0, 80.0)
             legs[[0, 2]] -= max(-weaker, 0.0)
             legs[[1, 3]] -= max(weaker, 0.0)
+        legs[~np.array(stage.pushes)] = _OFF
         return legs
 
     def _bend(self, stage: Bend, seen: dict[str, Array]) -> tuple[Array, float, Array]:
