@@ -90,10 +90,13 @@ def stages(places: Places) -> tuple[Go | Bend, ...]:
 
 
 class CourseWalker:
-    """Walks the course: ``act`` turns an observation into an action."""
+    """Walks the course: ``act`` turns an observation into an action.
 
-    soft = np.float64(116.0)  # spines are hot enough to be bent [°C]
-    rigid = np.float64(75.0)  # spines are cold enough to be let go [°C]
+    Its gains, thresholds and waiting times were found by trial in this task.
+    """
+
+    soft = 116.0  # spines are hot enough to be bent [°C]
+    rigid = 75.0  # spines are cold enough to be let go [°C]
     hottest = 172.0  # temperature that no TCA is to exceed [°C]
 
     def __init__(self, env: TetrapodCourse) -> None:

@@ -26,8 +26,9 @@ class LegSpec:
     Attributes:
         length: Length of the rod between root and foot [m]. Estimate: with legs of this length
             the robot in its U shape is a third as wide as it is flat (Sun, Section 6.3.2).
-        rod_diameter: Diameter of the carbon-fibre rod [m]. Estimate: a size that is sold, stiff
-            enough to stand on and soft enough to be bent by TCAs.
+        rod_diameter: Diameter of the carbon-fibre rod [m]. Fitted, between the 0.4 and
+            0.5 mm that are sold, to crawl and walk near the published speeds (Sun, Section 6.3.2):
+            those are then no test of it.
         offset: Distance of the TCAs from the rod [m]. Estimate.
         phase: Angle of the first TCA from the leg's x axis [rad].
         count: Number of TCAs, at equal angles from ``phase`` on.

@@ -20,7 +20,8 @@ class TwistingSpec:
         length: Length of the module [m]. Sun, Section 5.3.2.
         diameter: Diameter of the section that carries load [m]. Estimate: with the printed
             4.5 mm the double helix would turn less than the single one, against the measurement;
-            that takes more than 5.7 mm.
+            that takes more than 4.7 mm, and 5.1 mm in a
+            chain, which does not shear.
         outer_diameter: Diameter of the body with the wrapped tube [m]. Sun, Section 4.1.4:
             the arm is 10 mm wide.
         radius: Distance of the TCA from the centre line [m]. Sun, Section 5.3.2.
