@@ -10,11 +10,11 @@ from dm_control.utils import rewards
 from numpy.typing import ArrayLike, NDArray
 
 from tca_mj.assets import mjcf
-from tca_mj.envs.base import Action, Observation, SimulatedTask
+from tca_mj.envs.base import Observation, Outcome, SimulatedTask
 from tca_mj.envs.table import Entry, Table, numbers
 from tca_mj.model.scene import scene
 from tca_mj.robots.arm import ArmSpec, arm
-from tca_mj.sim import Simulation, SimulationDiverged
+from tca_mj.sim import Drive, Simulation, SimulationDiverged
 
 # Objects, with the width that the gripper has to reach round [m].
 OBJECTS = {"screwdriver": 8e-3, "pcb": 3.6e-3}
@@ -235,23 +235,14 @@ class ArmPickPlace(SimulatedTask):
         start = self._free_q[kind]
         data.qpos[start : start + 7] = [*pose, *turn]
 
-    def step(self, action: Action) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
-        """Heats and moves for ``control_period``; see the class.
-
-        Raises:
-            ValueError: If the action has the wrong shape, is not finite or out of [-1, 1].
-        """
-        command = numbers("action", action, (ACTION.size,))
-        if np.abs(command).max() > 1.0 + 1e-6:
-            raise ValueError(f"action must be within -1 and 1, got {command}")
-        command = np.clip(command, -1.0, 1.0)
-        power = self.max_power * (command[:5] + 1.0) / 2.0
+    def begin(self, command: NDArray[np.float64]) -> Drive:
+        """Power of the TCAs and, at once, velocity of the base; see the class."""
         self.data.ctrl[0] = self.arm_spec.speed * command[5]
-        reason = None
-        try:
-            self.sim.step(power, self.control_period)
-        except SimulationDiverged as error:
-            reason = f"diverged: {error}"
+        return Drive(power=self.max_power * (command[:5] + 1.0) / 2.0)
+
+    def finish(self, drive: Drive, error: SimulationDiverged | None) -> Outcome:
+        """What the control step has led to; see ``SimulatedTask``."""
+        reason = None if error is None else f"diverged: {error}"
         self._carried = self._carried or bool(self._position()[2] > _STAND + _LIFTED)
         observation = self._observe()
         outside = OBSERVATION.outside(observation)
@@ -262,7 +253,7 @@ class ArmPickPlace(SimulatedTask):
         if reason is None:  # nothing is known of a diverged state
             self._progress, rests = self._judge()
         terms = {name: value - before[name] for name, value in self._progress.items()}
-        terms["energy"] = -0.002 * float(np.sum(power)) * self.control_period
+        terms["energy"] = -0.002 * float(np.sum(drive.power)) * self.control_period
         reason = reason or self._damage()
         self._in_cup = self._in_cup + 1 if rests else 0
         success = self._in_cup >= 3 and reason is None

@@ -7,15 +7,22 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from tca_mj.envs.table import numbers
 from tca_mj.render import Offscreen, colour_tendons
-from tca_mj.sim import Simulation
+from tca_mj.sim import Drive, Simulation, SimulationDiverged
 
 Observation = NDArray[np.float32]
 Action = NDArray[np.float32]
+Outcome = tuple[Observation, float, bool, bool, dict[str, Any]]
+"""What ``step`` returns: observation, reward, terminated, truncated and info."""
 
 
 class SimulatedTask(gym.Env[Observation, Action]):
     """A task that runs a ``Simulation``; its heirs say what is seen, done and paid for.
+
+    A step is ``begin``, which says what the action does to the simulation, then the simulation,
+    then ``finish``, which judges where that has led. A vector environment calls the two for each
+    of its tasks and lets all simulations run between them.
 
     Attributes:
         sim: The simulation.
@@ -29,6 +36,44 @@ class SimulatedTask(gym.Env[Observation, Action]):
     _camera: str
     _size: tuple[int, int]
     _screen: Offscreen | None = None
+
+    def begin(self, command: NDArray[np.float64]) -> Drive:
+        """Translates a command, the action within its bounds, to what drives the simulation."""
+        raise NotImplementedError
+
+    def finish(self, drive: Drive, error: SimulationDiverged | None) -> Outcome:
+        """What the control step has led to.
+
+        Args:
+            drive: What ``begin`` returned.
+            error: Why the simulation broke off, or None.
+        """
+        raise NotImplementedError
+
+    def command(self, action: Action) -> NDArray[np.float64]:
+        """The action as finite numbers within -1 and 1.
+
+        Raises:
+            ValueError: If the action has the wrong shape, is not finite or out of [-1, 1].
+        """
+        command = numbers("action", action, self.action_space.shape or ())
+        if np.abs(command).max() > 1.0 + 1e-6:
+            raise ValueError(f"action must be within -1 and 1, got {command}")
+        return np.clip(command, -1.0, 1.0)
+
+    def step(self, action: Action) -> Outcome:
+        """Runs the simulation for ``control_period``; see the class.
+
+        Raises:
+            ValueError: If the action has the wrong shape, is not finite or out of [-1, 1].
+        """
+        drive = self.begin(self.command(action))
+        error = None
+        try:
+            self.sim.step(drive.power, self.control_period, voltage=drive.voltage, fan=drive.fan)
+        except SimulationDiverged as diverged:
+            error = diverged
+        return self.finish(drive, error)
 
     # What tools that know Gymnasium's own MuJoCo environments look for.
     @property

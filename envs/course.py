@@ -8,12 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tca_mj.assets import mjcf
-from tca_mj.envs.base import Action, Observation, SimulatedTask
+from tca_mj.envs.base import Observation, Outcome, SimulatedTask
 from tca_mj.envs.stance import CAMERAS as FOLLOWING
 from tca_mj.envs.stance import tetrapod_scene
 from tca_mj.envs.table import Entry, Table, numbers
 from tca_mj.robots.tetrapod import LEGS, SPINES, TetrapodSpec
-from tca_mj.sim import SimulationDiverged
+from tca_mj.sim import Drive, SimulationDiverged
 from tca_mj.smp import HeaterSpec, SpineSpec
 
 CAMERAS = (*FOLLOWING, "overview")
@@ -164,6 +164,7 @@ class TetrapodCourse(SimulatedTask):
         self._setup: dict[str, Any] = {}
         self.touched = False
         self._x = 0.0
+        self._before = 0.0, 0  # energy used and spines harmed before the step
 
     def _find(self, model: mujoco.MjModel) -> None:
         """Looks up the addresses of what is observed and judged."""
@@ -256,32 +257,22 @@ class TetrapodCourse(SimulatedTask):
             setup["friction"] = 1.0 + float(setup["randomise"]) * side
         return setup
 
-    def step(self, action: Action) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
-        """Heats for ``control_period``; see the class.
+    def begin(self, command: NDArray[np.float64]) -> Drive:
+        """Power of the TCAs and voltage of the heaters; see the class."""
+        share = (command + 1.0) / 2.0
+        self._before = self.energy, int(self.sim.spines.damaged.sum())
+        return Drive(power=self.max_power * share[:TCAS], voltage=self.max_voltage * share[TCAS:])
 
-        Raises:
-            ValueError: If the action has the wrong shape, is not finite or out of [-1, 1].
-        """
-        command = numbers("action", action, (ACTION.size,))
-        if np.abs(command).max() > 1.0 + 1e-6:
-            raise ValueError(f"action must be within -1 and 1, got {command}")
-        command = (np.clip(command, -1.0, 1.0) + 1.0) / 2.0
-        before, harmed = self.energy, int(self.sim.spines.damaged.sum())
-        reason = None
-        try:
-            self.sim.step(
-                self.max_power * command[:TCAS],
-                self.control_period,
-                voltage=self.max_voltage * command[TCAS:],
-            )
-        except SimulationDiverged as error:
-            reason = f"diverged: {error}"
+    def finish(self, drive: Drive, error: SimulationDiverged | None) -> Outcome:
+        """What the control step has led to; see ``SimulatedTask``."""
+        reason = None if error is None else f"diverged: {error}"
         observation = self._observe()
         outside = OBSERVATION.outside(observation)
         if outside:
             reason = reason or f"diverged: {', '.join(outside)} out of bounds"
             observation = OBSERVATION.bounded(observation)
         reason = reason or self._damage()
+        used, harmed = self._before
         terms = dict.fromkeys(("progress", "touch", "damage", "finish", "energy"), 0.0)
         finished = fallen = False
         if reason is None:  # nothing is known of a diverged state
@@ -293,7 +284,7 @@ class TetrapodCourse(SimulatedTask):
             terms["touch"] = -0.1 if touches else 0.0
             terms["damage"] = -5.0 * (int(self.sim.spines.damaged.sum()) - harmed)
             terms["finish"] = 20.0 if finished else 0.0
-            terms["energy"] = -1e-5 * (self.energy - before)
+            terms["energy"] = -1e-5 * (self.energy - used)
         unharmed = not (self.touched or self.sim.spines.damaged.any())
         info = {"reward_terms": terms, "success": finished and unharmed, **self._info()}
         if reason is not None:

@@ -7,15 +7,16 @@ from typing import Any
 import mujoco
 import numpy as np
 from dm_control.utils import rewards
+from numpy.typing import NDArray
 
 from tca_mj.assets import mjcf
-from tca_mj.envs.base import Action, Observation, SimulatedTask
+from tca_mj.envs.base import Observation, Outcome, SimulatedTask
 from tca_mj.envs.table import Entry, Table, numbers
 from tca_mj.model.part import Part, new_spec
 from tca_mj.model.scene import scene
 from tca_mj.modules.morphing import MorphingSpec, morphing_module
 from tca_mj.render import colour_tendons
-from tca_mj.sim import Simulation, SimulationDiverged
+from tca_mj.sim import Drive, Simulation, SimulationDiverged
 
 CAMERAS = ("front", "side")
 
@@ -138,7 +139,7 @@ class MorphModule(SimulatedTask):
         self.action_space = ACTION.space
         self._camera, self._size = f"stand.{camera}", size
         self.target = self.target_range[1]
-        self._at_goal = 0
+        self._at_goal, self._used = 0, 0.0
         self._find(self.model, part)
         self._progress = self._judge()
 
@@ -206,25 +207,20 @@ class MorphModule(SimulatedTask):
             setup["start"] = low + along if along < below else high - (below + above - along)
         return setup
 
-    def step(self, action: Action) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
-        """Heats and cools for ``control_period``; see the class.
+    def begin(self, command: NDArray[np.float64]) -> Drive:
+        """Voltage of the heater, power of the TCA, and the fan; see the class."""
+        share = (command + 1.0) / 2.0
+        self._used = self._energy()
+        return Drive(
+            power=self.max_power * share[1:2],
+            voltage=self.max_voltage * share[0],
+            fan=bool(command[2] > 0.0),
+        )
 
-        Raises:
-            ValueError: If the action has the wrong shape, is not finite or out of [-1, 1].
-        """
-        command = numbers("action", action, (ACTION.size,))
-        if np.abs(command).max() > 1.0 + 1e-6:
-            raise ValueError(f"action must be within -1 and 1, got {command}")
-        share = (np.clip(command, -1.0, 1.0) + 1.0) / 2.0
-        voltage, power = self.max_voltage * share[0], self.max_power * share[1]
-        fan = bool(command[2] > 0.0)
-        used = self._energy()
-        reason = None
-        try:
-            self.sim.step(power[None], self.control_period, voltage=voltage, fan=fan)
-        except SimulationDiverged as error:
-            reason = f"diverged: {error}"
-        off = voltage == 0.0 and power == 0.0 and not fan
+    def finish(self, drive: Drive, error: SimulationDiverged | None) -> Outcome:
+        """What the control step has led to; see ``SimulatedTask``."""
+        reason = None if error is None else f"diverged: {error}"
+        off = not (drive.power.any() or drive.voltage or drive.fan)
         before = self._progress
         if reason is None:  # nothing is known of a diverged state
             self._progress = self._judge()
@@ -238,7 +234,7 @@ class MorphModule(SimulatedTask):
         success = self._at_goal * self.control_period > self.hold_time - 1e-9 and reason is None
         terms = {name: value - before[name] for name, value in self._progress.items()}
         terms["goal"] = 20.0 if success else 0.0
-        terms["energy"] = -0.01 * (self._energy() - used)
+        terms["energy"] = -0.01 * (self._energy() - self._used)
         terms["damage"] = -10.0 if reason is not None and reason.startswith("damaged") else 0.0
         info = {"reward_terms": terms, "success": success, **self._info()}
         if reason is not None:

@@ -6,13 +6,14 @@ from dataclasses import asdict, dataclass
 from typing import Any, ClassVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tca_mj.assets import mjcf
-from tca_mj.envs.base import Action, Observation, SimulatedTask
+from tca_mj.envs.base import Observation, Outcome, SimulatedTask
 from tca_mj.envs.stance import CAMERAS, LEG_TCAS, Stance, tetrapod_scene
 from tca_mj.envs.table import Entry, Table, numbers
 from tca_mj.robots.tetrapod import TetrapodSpec
-from tca_mj.sim import SimulationDiverged
+from tca_mj.sim import Drive, SimulationDiverged
 from tca_mj.variation import Nominal, Variation
 
 OBSERVATION = Table(
@@ -222,22 +223,15 @@ class TetrapodGait(SimulatedTask):
         varied = asdict(Variation.drawn(draws.tolist(), setup["randomise"]))
         return setup | {"variation": Variation(**(varied | given))}
 
-    def step(self, action: Action) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
-        """Heats for ``control_period``; see the class.
-
-        Raises:
-            ValueError: If the action has the wrong shape, is not finite or out of [-1, 1].
-        """
-        command = numbers("action", action, (ACTION.size,))
-        if np.abs(command).max() > 1.0 + 1e-6:
-            raise ValueError(f"action must be within -1 and 1, got {command}")
+    def begin(self, command: NDArray[np.float64]) -> Drive:
+        """Power of the legs' TCAs; see the class."""
         power = np.zeros(self.sim.n)
-        power[:LEG_TCAS] = self.max_power * (np.clip(command, -1.0, 1.0) + 1.0) / 2.0
-        reason = None
-        try:
-            self.sim.step(power, self.control_period)
-        except SimulationDiverged as error:
-            reason = f"diverged: {error}"
+        power[:LEG_TCAS] = self.max_power * (command + 1.0) / 2.0
+        return Drive(power=power)
+
+    def finish(self, drive: Drive, error: SimulationDiverged | None) -> Outcome:
+        """What the control step has led to; see ``SimulatedTask``."""
+        reason = None if error is None else f"diverged: {error}"
         observation = self._observe()
         outside = OBSERVATION.outside(observation)
         if outside:
@@ -253,7 +247,7 @@ class TetrapodGait(SimulatedTask):
         excess = np.maximum(self.sim.temperature - self.hot_temperature, 0.0)
         terms |= {
             "posture": -0.2 * tilt,
-            "energy": -0.002 * float(np.sum(power)) * self.control_period,
+            "energy": -0.002 * float(np.sum(drive.power)) * self.control_period,
             "heat": -0.002 * float(np.sum(excess)) if reason is None else 0.0,
             "end": -5.0 if fallen or damage else 0.0,
         }

@@ -15,7 +15,7 @@ decide; a first step from rest differs by a tenth between the two. Every TCA the
 """
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import mujoco
@@ -43,6 +43,21 @@ _DIVERGENCE = {
 
 class SimulationDiverged(ArithmeticError):
     """The simulation left the range of finite, physical states."""
+
+
+@dataclass(frozen=True, kw_only=True, slots=True, eq=False)
+class Drive:
+    """What drives a simulation, constant over a step; checked by ``Simulation.step``.
+
+    Attributes:
+        power: Power of the TCAs, shape (n,) [W].
+        voltage: Voltage of the spines' heaters, shape (spines.n,) or one for all [V].
+        fan: Whether air is blown at the spines, shape (spines.n,) or one for all.
+    """
+
+    power: NDArray[np.float64]
+    voltage: ArrayLike = 0.0
+    fan: ArrayLike = False
 
 
 class Simulation:
