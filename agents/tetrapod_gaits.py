@@ -58,13 +58,13 @@ class GaitPolicy:
     Attributes:
         gait: The gait.
         steering: How much cooler the legs of the side to turn to are kept, per angle between where
-            the robot looks and where it ought to [K/rad].
+            the robot looks and where it ought to, one number or one for each leg [K/rad].
         robot: The robot it was told that it has.
         time: Time since the start [s].
     """
 
     gait: Gait
-    steering: float = 0.0
+    steering: float | tuple[float, ...] = 0.0
     robot: TetrapodSpec = field(default_factory=TetrapodSpec)
     time: float = 0.0
     _thermostat: Thermostat = field(init=False)
@@ -92,20 +92,42 @@ class GaitPolicy:
             raise ValueError(f"gait must be one of {list(GAITS)}, got {gait!r}")
         return cls(GAITS[gait], _STEERING[gait], robot or TetrapodSpec())
 
+    @property
+    def phase(self) -> str:
+        """What it does: a gait has no phases that are worth a name."""
+        return "gait"
+
+    @property
+    def cycle(self) -> float:
+        """Where in the cycle it is, 0 to 1."""
+        return self.time / self.gait.period % 1.0
+
     def reset(self) -> None:
         """Starts anew."""
         self.time = 0.0
 
-    def act(self, observation: NDArray[np.float32]) -> NDArray[np.float32]:
-        """The action for the next control period, shape (12,)."""
+    def act(
+        self, observation: NDArray[np.float32], correction: NDArray[np.float64] | float = 0.0
+    ) -> NDArray[np.float32]:
+        """The action for the next control period, shape (12,).
+
+        Args:
+            observation: What is seen.
+            correction: Added to the temperatures of the gait, shape (12,) [K]. What it makes
+                hotter than both the gait and ``TetrapodGait.hot_temperature`` is cut off there.
+        """
         rows = OBSERVATION.read(observation.astype(np.float64))
         target = self.gait.temperature(self.time / self.gait.period).reshape(len(_LEFT), -1)
         x, y = rows["commanded direction"]
-        weaker = np.clip(self.steering * np.arctan2(y, x), -80.0, 80.0)
-        side = _LEFT if weaker > 0.0 else 1.0 - _LEFT
-        target = target - abs(weaker) * side[:, None]
+        aside = np.arctan2(y, x)
+        weaker = np.clip(np.array(self.steering) * aside, -80.0, 80.0)
+        side = _LEFT if aside > 0.0 else 1.0 - _LEFT
+        target = (target - (np.abs(weaker) * side)[:, None]).ravel()
+        limit = np.maximum(target, TetrapodGait.hot_temperature)
         self.time += TetrapodGait.control_period
-        power = self._thermostat.power(rows["TCA temperature"], target.ravel())
+        power = self._thermostat.power(
+            rows["TCA temperature"], np.minimum(target + correction, limit)
+        )
         action = 2.0 * power / TetrapodGait.max_power - 1.0
         return np.clip(action, -1.0, 1.0).astype(ACTION.space.dtype)
 

@@ -47,7 +47,8 @@ _VIEW = """\
 Opens a window in which the task runs. Space starts and pauses, backspace begins the next episode,
 = and - change the speed, ] goes to the next camera, F1 lists all keys.
 
-Policies: scripted (the task's own), off (no power), random.
+Policies: scripted (the task's own), off (no power), random, the name of one that comes with the
+package (`tca-mj list` shows them), or the file of a trained one.
 
 examples:
   tca-mj view TCA/ArmPickPlace-v0
@@ -145,7 +146,9 @@ def _parser() -> argparse.ArgumentParser:
         "view", help="watch a task in a window", description=_VIEW, formatter_class=style
     )
     view.add_argument("task", choices=[task.id for task in TASKS], metavar="TASK", help="its id")
-    view.add_argument("--policy", choices=POLICIES, default="scripted", help="who acts")
+    view.add_argument(
+        "--policy", default="scripted", help=f"{', '.join(POLICIES)}, a shipped one or a file"
+    )
     view.add_argument("--object", choices=OBJECTS, help="default: drawn at random")
     view.add_argument("--seed", type=_seed, default=0, help="seed of the first episode; default 0")
     view.set_defaults(run=_view)
@@ -249,12 +252,18 @@ def speed_table(summary: dict[str, Any]) -> str:
 def _list(arguments: argparse.Namespace) -> int:
     import gymnasium
 
+    from tca_mj.agents.policy import SavedPolicy, shipped
+
+    policies = {name: SavedPolicy.read(path) for name, path in shipped().items()}
     for task in TASKS:
         env = gymnasium.make(task.id, disable_env_checker=True)
         about = (type(env.unwrapped).__doc__ or "").strip().partition("\n")[0]
         print(task.id)
         print(f"    {about}")
         print(f"    action {env.action_space.shape}, observation {env.observation_space.shape}")
+        for name, policy in policies.items():
+            if policy.task == task.id:
+                print(f"    policy {name}: {policy.kind} by {policy.origin.algorithm}")
         env.close()
     return 0
 
@@ -270,12 +279,14 @@ def _view(arguments: argparse.Namespace) -> int:
     import gymnasium
 
     env = gymnasium.make(arguments.task)
+    try:
+        policy = _policy(arguments.policy, env, arguments.seed)
+    except (FileNotFoundError, ValueError) as error:
+        print(f"tca-mj view: {error}", file=sys.stderr)
+        return 2
     options = {"object": arguments.object} if arguments.object else None
     print("space starts and pauses, backspace begins the next episode, F1 lists all keys")
-    launch(
-        env, _policy(arguments.policy, env, arguments.seed), seed=arguments.seed, options=options,
-        title=arguments.task,
-    )
+    launch(env, policy, seed=arguments.seed, options=options, title=arguments.task)
     return 0
 
 
@@ -287,6 +298,11 @@ def _policy(name: str, env: Any, seed: int) -> Any:
 
     from tca_mj.envs.viewer import ViewerPolicy
 
+    if name not in POLICIES:
+        from tca_mj.agents.policy import load_policy
+
+        loaded = load_policy(name, env)
+        return ViewerPolicy(loaded.act, loaded.reset)
     if name == "scripted":
         script = scripted(env.unwrapped)
         return ViewerPolicy(script.act, script.reset)

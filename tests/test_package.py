@@ -123,7 +123,7 @@ def test_mjcf_finds_every_file_of_its_folder():
 
 
 def test_wheel_holds_the_package_and_nothing_else(tmp_path):
-    """Built from a copy, without network; a file planted in the copy's assets must arrive."""
+    """Built from a copy, without network; files planted in assets and policies must arrive."""
     copy = tmp_path / "copy"
     copy.mkdir()
     for name in ("pyproject.toml", "README.md", "LICENSE", "MANIFEST.in"):
@@ -133,6 +133,9 @@ def test_wheel_holds_the_package_and_nothing_else(tmp_path):
     planted = copy / "assets" / "mjcf" / "deep" / "planted.xml"
     planted.parent.mkdir(parents=True)
     planted.write_text("<mujoco/>", encoding="utf-8")
+    policy = copy / "agents" / "policies" / "planted.npz"
+    policy.parent.mkdir(exist_ok=True)
+    policy.write_bytes(b"")
 
     code = "from setuptools import build_meta; build_meta.build_wheel('out')"
     run_python(code, copy)
@@ -154,4 +157,5 @@ def test_wheel_holds_the_package_and_nothing_else(tmp_path):
     shipped = {name for name in names if name.startswith("tca_mj/")}
     assert shipped == {path.as_posix() for path in expected}
     assert "tca_mj/assets/mjcf/deep/planted.xml" in shipped
+    assert "tca_mj/agents/policies/planted.npz" in shipped
     assert "tca-mj = tca_mj.cli:main" in command

@@ -16,11 +16,16 @@ from numpy.typing import ArrayLike, NDArray
 from tca_mj.tca import HeatSpec
 
 Array = NDArray[np.float64]
+Row = tuple[float, ...]
+Rows = Row | tuple[Row, ...]
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Gait:
     """One cycle of all legs.
+
+    ``start``, ``duty``, ``hot`` and ``warm`` are a row of one number for each TCA of a leg, which
+    all legs share, or as many such rows as there are legs.
 
     Attributes:
         period: Duration of a cycle, positive [s].
@@ -35,24 +40,29 @@ class Gait:
     """
 
     period: float
-    offset: tuple[float, ...]
-    start: tuple[float, ...]
-    duty: tuple[float, ...]
-    hot: tuple[float, ...]
-    warm: tuple[float, ...]
+    offset: Row
+    start: Rows
+    duty: Rows
+    hot: Rows
+    warm: Rows
 
     def __post_init__(self) -> None:
         if not 0.0 < self.period < math.inf:
             raise ValueError(f"period must be finite and above 0 s, got {self.period}")
+        tcas = _table("start", self.start).shape[-1]
         for name in ("offset", "start", "duty", "hot", "warm"):
-            value = np.asarray(getattr(self, name), dtype=np.float64)
-            if value.ndim != 1 or not len(value) or not np.isfinite(value).all():
-                raise ValueError(f"{name} must be a row of finite numbers, got {value}")
-            if name != "offset" and len(value) != len(self.start):
-                raise ValueError(f"{name} must have {len(self.start)} numbers, got {len(value)}")
-        if not all(0.0 <= duty <= 1.0 for duty in self.duty):
+            value = _table(name, getattr(self, name))
+            if name == "offset":
+                if value.ndim != 1:
+                    raise ValueError(f"offset must be a row of finite numbers, got {self.offset}")
+            elif value.shape[-1] != tcas:
+                raise ValueError(f"{name} must have {tcas} numbers per leg, got {value.shape[-1]}")
+            elif value.ndim == 2 and len(value) != self.legs:
+                raise ValueError(f"{name} must have 1 or {self.legs} rows, got {len(value)}")
+        duty = np.array(self.duty)
+        if not ((duty >= 0.0) & (duty <= 1.0)).all():
             raise ValueError(f"duty must be between 0 and 1, got {self.duty}")
-        if not all(w <= h for w, h in zip(self.warm, self.hot, strict=True)):
+        if not (np.array(self.warm) <= np.array(self.hot)).all():
             raise ValueError(f"warm must be at most hot {self.hot}, got {self.warm}")
 
     @property
@@ -74,6 +84,21 @@ class Gait:
         hot, warm = np.array(self.hot, dtype=np.float64), np.array(self.warm, dtype=np.float64)
         target = np.where(into < np.array(self.duty), hot, warm)
         return target.reshape(*target.shape[:-2], -1)
+
+    def table(self, name: str) -> Array:
+        """``start``, ``duty``, ``hot`` or ``warm`` of every leg, shape (legs, TCAs per leg)."""
+        row = _table(name, getattr(self, name))
+        return np.broadcast_to(row, (self.legs, row.shape[-1])).copy()
+
+
+def _table(name: str, rows: Rows) -> Array:
+    try:
+        value = np.asarray(rows, dtype=np.float64)
+    except (TypeError, ValueError):
+        value = np.array(np.nan)
+    if value.ndim not in (1, 2) or not value.size or not np.isfinite(value).all():
+        raise ValueError(f"{name} must be rows of finite numbers of one length, got {rows}")
+    return value
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)

@@ -1,0 +1,313 @@
+"""Policies as files: what was searched or learned acts without the code that made it.
+
+A file holds a header in JSON (format, kind, task, origin, and what the kind needs) and, where there
+is a network, its arrays. Kinds:
+
+* ``gait``: a ``.json`` file that is the header; a gait and its steering.
+* ``network``: a ``.npz`` file; ``header`` is the JSON text, ``mean`` and ``var`` normalise the
+  observation, ``weight0``, ``bias0``, ``weight1``, ... are the layers (see ``Network``).
+* ``residual``: a ``.npz`` file with both; the network sees the observation and the gait's phase,
+  and corrects the temperatures of the gait within a bound.
+
+No file is unpickled, and none needs torch or Stable-Baselines3.
+"""
+
+import io
+import json
+import os
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from importlib.resources import files
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tca_mj.agents.network import Network
+from tca_mj.agents.tetrapod_gaits import GaitPolicy
+from tca_mj.control import Gait
+from tca_mj.envs.tetrapod import ACTION, OBSERVATION
+
+FORMAT = 1
+KINDS = {"gait": ".json", "network": ".npz", "residual": ".npz"}
+
+
+class Policy(Protocol):
+    """Who acts: an observation in, an action out."""
+
+    @property
+    def phase(self) -> str:
+        """What it is doing, in a word, for recordings and progress bars."""
+
+    def reset(self) -> None:
+        """Called before every episode."""
+
+    def act(self, observation: NDArray[np.float32]) -> NDArray[np.float32]:
+        """The action for the next control period."""
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Origin:
+    """Where a policy comes from.
+
+    Attributes:
+        algorithm: What made it, as ``cma`` or ``ppo``.
+        seed: Seed of the run.
+        steps: Steps of the environment that the run had made by then.
+        command: The command that made it.
+        source: What it started from, or what else is to be known.
+        versions: Of Python and the packages, by name.
+    """
+
+    algorithm: str
+    seed: int
+    steps: int
+    command: str = ""
+    source: str = ""
+    versions: Mapping[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class SavedPolicy:
+    """The contents of a policy's file; see the module for the kinds.
+
+    Attributes:
+        task: Gymnasium id of the task that it is for.
+        origin: Where it comes from.
+        gait: The gait, of the kinds ``gait`` and ``residual``.
+        steering: As in ``GaitPolicy``, one number per leg [K/rad].
+        network: The network, of the kinds ``network`` and ``residual``.
+        bound: Largest correction of a temperature, of the kind ``residual`` [K].
+
+    Raises:
+        ValueError: If there is neither gait nor network, or the bound is missing or negative.
+    """
+
+    task: str
+    origin: Origin
+    gait: Gait | None = None
+    steering: tuple[float, ...] = ()
+    network: Network | None = None
+    bound: float = 0.0
+
+    def __post_init__(self) -> None:
+        if self.gait is None and self.network is None:
+            raise ValueError("a policy must have a gait or a network, got neither")
+        if self.gait is not None and len(self.steering) != self.gait.legs:
+            raise ValueError(
+                f"steering must have {self.gait.legs} numbers, got {len(self.steering)}"
+            )
+        if not np.isfinite((*self.steering, self.bound)).all():
+            raise ValueError(f"steering and bound must be finite, got {self.steering, self.bound}")
+        if (self.bound > 0.0) != (self.kind == "residual"):
+            raise ValueError(
+                f"bound must be above 0 K with gait and network, else 0, got {self.bound}"
+            )
+
+    @property
+    def kind(self) -> str:
+        """``gait``, ``network`` or ``residual``."""
+        if self.gait is None:
+            return "network"
+        return "gait" if self.network is None else "residual"
+
+    def save(self, path: str | Path) -> Path:
+        """Writes the file in one go: whoever reads it finds the old or the new one.
+
+        Raises:
+            ValueError: If the ending is not that of the kind.
+        """
+        path = Path(path)
+        if path.suffix != KINDS[self.kind]:
+            raise ValueError(f"path must end in {KINDS[self.kind]} for a {self.kind}, got {path}")
+        header: dict[str, Any] = {
+            "format": FORMAT, "kind": self.kind, "task": self.task, "origin": asdict(self.origin)
+        }  # fmt: skip
+        if self.gait is not None:
+            header |= {"gait": asdict(self.gait), "steering": self.steering}
+        if self.network is None:
+            text = json.dumps(header, indent=2, ensure_ascii=False) + "\n"
+            return write_whole(path, text.encode())
+        network = self.network
+        arrays: dict[str, Any] = {"mean": network.mean, "var": network.var}
+        names = ("clip", "epsilon", "activation", "squash")
+        header |= {"network": {name: getattr(network, name) for name in names}}
+        header |= {"bound": self.bound} if self.kind == "residual" else {}
+        for i, (weight, bias) in enumerate(zip(network.weights, network.biases, strict=True)):
+            arrays |= {f"weight{i}": weight, f"bias{i}": bias}
+        memory = io.BytesIO()
+        np.savez(memory, allow_pickle=False, header=np.array(json.dumps(header)), **arrays)
+        return write_whole(path, memory.getvalue())
+
+    @classmethod
+    def read(cls, path: str | Path) -> "SavedPolicy":
+        """Reads a file.
+
+        Raises:
+            FileNotFoundError: If there is none.
+            ValueError: If it is not a policy's, or of a newer format.
+        """
+        path = Path(path)
+        arrays: dict[str, NDArray[Any]] = {}
+        try:
+            if path.suffix == ".npz":
+                with np.load(path, allow_pickle=False) as archive:
+                    arrays = dict(archive)
+                header = json.loads(str(arrays.pop("header")))
+            else:
+                header = json.loads(path.read_text(encoding="utf-8"))
+            if header["format"] != FORMAT:
+                raise ValueError(f"format must be {FORMAT}, got {header['format']}")
+            if header["kind"] not in KINDS:
+                raise ValueError(f"kind must be one of {list(KINDS)}, got {header['kind']!r}")
+            found = cls(
+                task=header["task"],
+                origin=Origin(**header["origin"]),
+                gait=_gait(header["gait"]) if header["kind"] != "network" else None,
+                steering=tuple(header.get("steering", ())),
+                network=_network(header, arrays) if header["kind"] != "gait" else None,
+                bound=header.get("bound", 0.0),
+            )
+        except FileNotFoundError:
+            raise
+        except Exception as error:
+            raise ValueError(f"{path} is no policy: {type(error).__name__}: {error}") from error
+        return found
+
+    def make(self) -> "Policy":
+        """The policy, ready for an episode."""
+        if self.gait is None:
+            assert self.network is not None
+            return NetworkPolicy(self.network)
+        walker = GaitPolicy(self.gait, self.steering)
+        return walker if self.network is None else ResidualPolicy(walker, self.network, self.bound)
+
+
+@dataclass(slots=True)
+class NetworkPolicy:
+    """A network that acts on what it sees."""
+
+    network: Network
+
+    @property
+    def phase(self) -> str:
+        return "network"
+
+    def reset(self) -> None:
+        """Nothing is remembered."""
+
+    def act(self, observation: NDArray[np.float32]) -> NDArray[np.float32]:
+        """The action for the next control period."""
+        return self.network(observation)
+
+
+@dataclass(slots=True)
+class ResidualPolicy:
+    """A gait, corrected by a network that sees the observation and the gait's phase.
+
+    Attributes:
+        walker: The gait on feedback.
+        network: Its output times ``bound`` is added to the gait's temperatures.
+        bound: Largest correction [K].
+    """
+
+    walker: GaitPolicy
+    network: Network
+    bound: float
+
+    @property
+    def phase(self) -> str:
+        return "residual"
+
+    def reset(self) -> None:
+        """Starts the gait anew."""
+        self.walker.reset()
+
+    def act(self, observation: NDArray[np.float32]) -> NDArray[np.float32]:
+        """The action for the next control period."""
+        correction = self.network(with_clock(observation, self.walker))
+        return self.walker.act(observation, self.bound * correction.astype(np.float64))
+
+
+def with_clock(observation: NDArray[np.float32], walker: GaitPolicy) -> NDArray[np.float32]:
+    """The observation, and sine and cosine of the gait's phase behind it."""
+    angle = 2.0 * np.pi * walker.cycle
+    return np.append(observation, np.array([np.sin(angle), np.cos(angle)], dtype=np.float32))
+
+
+def load_policy(source: str | Path, env: Any) -> Policy:
+    """A saved policy, ready to act in an environment.
+
+    Args:
+        source: Path of a file, or the name of a shipped policy (see ``shipped``).
+        env: The Gymnasium environment; its task has to be the policy's.
+
+    Raises:
+        FileNotFoundError: If there is no such file, nor a shipped policy of that name.
+        ValueError: If the file is no policy, or one for another task.
+    """
+    saved = SavedPolicy.read(find(source))
+    spec = env.spec
+    if spec is not None and spec.id != saved.task:
+        raise ValueError(f"{source} is a policy for {saved.task}, not for {spec.id}")
+    given = (env.observation_space.shape[0], env.action_space.shape[0])
+    needed, network = (OBSERVATION.size, ACTION.size), saved.network
+    if network is not None:
+        needed = (network.inputs - (2 if saved.kind == "residual" else 0), network.outputs)
+    if needed != given:
+        raise ValueError(
+            f"{source} turns {needed[0]} numbers into {needed[1]}, the task has"
+            f" {given[0]} and {given[1]}"
+        )
+    return saved.make()
+
+
+def find(source: str | Path) -> Path:
+    """The file of a policy; see ``load_policy``."""
+    path = Path(source)
+    if path.is_file():
+        return path
+    known = shipped()
+    if str(source) in known:
+        return known[str(source)]
+    raise FileNotFoundError(
+        f"no file {path}, and no shipped policy of that name; shipped are {sorted(known)}"
+    )
+
+
+def shipped() -> dict[str, Path]:
+    """The files of the policies that come with the package, by name."""
+    folder = Path(str(files("tca_mj.agents"))) / "policies"
+    found = sorted(folder.glob("*")) if folder.is_dir() else []
+    return {path.stem: path for path in found if path.suffix in KINDS.values()}
+
+
+def write_whole(path: Path, content: bytes) -> Path:
+    """Replaces a file in one go, after its content has reached the disk."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    beside = path.with_name(f".{path.name}.tmp")
+    with beside.open("wb") as file:
+        file.write(content)
+        file.flush()
+        os.fsync(file.fileno())
+    os.replace(beside, path)
+    return path
+
+
+def _gait(row: Mapping[str, Any]) -> Gait:
+    def rows(value: Any) -> Any:
+        return tuple(rows(x) for x in value) if isinstance(value, list) else value
+
+    return Gait(**{name: rows(value) for name, value in row.items()})
+
+
+def _network(header: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]]) -> Network:
+    layers = range((len(arrays) - 2) // 2)
+    return Network(
+        weights=tuple(arrays[f"weight{i}"].astype(np.float32) for i in layers),
+        biases=tuple(arrays[f"bias{i}"].astype(np.float32) for i in layers),
+        mean=arrays["mean"],
+        var=arrays["var"],
+        **header["network"],
+    )
