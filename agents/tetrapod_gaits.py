@@ -41,10 +41,11 @@ SHIMMY = Gait(
     offset=(0.0, 0.0, 0.5, 0.5),
     start=(0.02, 0.29, 0.63),
     duty=(0.37, 0.56, 0.53),
-    hot=(171.0, 172.0, 172.0),
+    hot=(160.0, 160.0, 160.0),
     warm=(25.0, 34.0, 25.0),
 )
-"""Front and rear pair clamp the beam by turns, like a caterpillar."""
+"""Front and rear pair clamp the beam by turns, like a caterpillar. At 172 °C it is a third faster,
+2.3 times the published speed; it is kept at 160 °C to stay near what was reported."""
 
 GAITS = MappingProxyType({"crawl": CRAWL, "walk": WALK, "shimmy": SHIMMY})
 

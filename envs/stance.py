@@ -187,10 +187,10 @@ class Stance:
                 data.qpos[self._lifts] = spread
                 mujoco.mj_kinematics(self._model, data)
                 mujoco.mj_collision(self._model, data)
-                if not data.ncon:
-                    return False, False
-                steep = np.abs(data.contact.frame[:, 2]) > 0.5
-                return bool(steep.any()), bool((~steep).any())
+                contact = data.contact
+                near = contact.dist < 0.5 * contact.includemargin  # about as deep as it will rest
+                steep = np.abs(contact.frame[:, 2]) > 0.5
+                return bool((near & steep).any()), bool((near & ~steep).any())
 
             # Legs pointing down stand on their feet, those below a beam's top only hang beside it.
             aside = at(above - _MARCH, 0.0)[1]

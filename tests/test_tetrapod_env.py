@@ -110,10 +110,10 @@ def test_it_starts_at_rest_on_its_ground(envs, gait):
 
 @pytest.mark.parametrize("gait", TASKS)
 def test_it_is_put_down_without_violence(envs, gait):
-    """Touching nothing yet, half a millimetre above something; legs beside a beam are spread."""
+    """Into the layer of its contacts but through nothing; legs beside a beam are spread."""
     env = envs[gait]
     env.sim.reset(env.stance.placer(bend=env.task.bend, above=env.task.beam or 0.0))
-    assert (env.data.contact.dist > 0.0).all()
+    assert 0.0 < env.data.contact.dist.min() < 0.5e-3
     env.data.qpos[2] -= 0.6e-3
     mujoco.mj_forward(env.model, env.data)
     assert -0.6e-3 < env.data.contact.dist.min() < 0.0
@@ -472,6 +472,21 @@ def test_the_walk_does_not_hang_on_the_time_step():
         follow(TetrapodGait(timestep=dt), policy, 90)[-1]["distance"] for dt in (5e-3, 2.5e-3)
     ]
     assert distance[0] == pytest.approx(distance[1], rel=0.1)
+
+
+@pytest.mark.parametrize(("gait", "steps"), [("walk", 90), ("shimmy", 150)])
+def test_feet_land_without_sinking_in(envs, gait, steps, monkeypatch):
+    """In no time step is a contact deeper than 0.3 mm, also where legs snap onto the beam."""
+    step, depths = mujoco.mj_step, []
+
+    def watched(model, data, count):
+        for _ in range(count):
+            step(model, data)
+            depths.append(-data.contact.dist.min() if data.ncon else 0.0)
+
+    monkeypatch.setattr(mujoco, "mj_step", watched)
+    follow(envs[gait], GaitPolicy.of(gait), steps)
+    assert len(depths) > 20 * steps and max(depths) < 0.3e-3
 
 
 def test_the_script_turns_to_where_it_is_told(walker):
