@@ -151,7 +151,7 @@ def tetrapod_course(
         return {
             "task": COURSE,
             **common,
-            "friction": round(float(episode.info["friction"]), 6),
+            "friction": round(float(episode.info["variation"]["friction"]), 6),
             "touched_plate": bool(episode.info["touched_plate"]),
             "damaged": bool(task.sim.spines.damaged.any()),
             "heater_energy": {k: round(v, 4) for k, v in episode.info["heater_energy"].items()},

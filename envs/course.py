@@ -1,6 +1,6 @@
 """``TCA/TetrapodCourse-v0``: under a plate, over a beam, to a target (Sun, Section 6.3.2)."""
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any, ClassVar
 
 import mujoco
@@ -15,6 +15,7 @@ from tca_mj.envs.table import Entry, Table, numbers
 from tca_mj.robots.tetrapod import LEGS, SPINES, TetrapodSpec
 from tca_mj.sim import Drive, SimulationDiverged
 from tca_mj.smp import HeaterSpec, SpineSpec
+from tca_mj.variation import Nominal, Variation
 
 CAMERAS = (*FOLLOWING, "overview")
 TCAS = 3 * len(LEGS) + SPINES
@@ -99,8 +100,10 @@ class TetrapodCourse(SimulatedTask):
     Reset: cold, flat and at rest before the plate, moved and turned a little at random. Options:
         position: x and y of its middle, at most 5 mm from 0 [m].
         yaw: Heading, at most 3° [rad].
-        friction: Factor of the friction of feet and body, 0.5 to 1.5; by default 1.
-        randomise: Share by which that factor is drawn from both sides of 1, 0 to 0.5.
+        friction, mass, tca_gain, heat_loss, ambient: The fields of ``tca_mj.variation.Variation``;
+            friction 0.5 to 1.5.
+        randomise: Spread with which friction is drawn if it is not given, 0 to 0.5; by default 0.
+        randomise_robot: The same for the other fields.
 
     Terminates at the finish, which is a success if nothing was touched or damaged, or when the
     robot has fallen. Truncates after the time limit, and with ``info["truncation_reason"]`` if a
@@ -160,8 +163,8 @@ class TetrapodCourse(SimulatedTask):
         self.observation_space = OBSERVATION.space
         self.action_space = ACTION.space
         self._camera, self._size = camera, size
+        self._nominal = Nominal(self.sim)
         self._find(self.model)
-        self._setup: dict[str, Any] = {}
         self.touched = False
         self._x = 0.0
         self._before = 0.0, 0  # energy used and spines harmed before the step
@@ -176,9 +179,6 @@ class TetrapodCourse(SimulatedTask):
         ]
         self._bends = np.array([address for address, _ in bends])
         self._signs = np.array([sign for _, sign in bends])
-        names = [model.body(int(b)).name for b in model.geom_bodyid]
-        self._own = np.array([name.startswith("robot.") for name in names])
-        self._friction = model.geom_friction.copy()
         self._plate = {model.geom(name).id for name in ("glass", "post0", "post1")}
 
         def end(name: str, sign: float) -> float:
@@ -215,10 +215,8 @@ class TetrapodCourse(SimulatedTask):
             ValueError: If an option is unknown or out of its range.
         """
         super().reset(seed=seed)
-        self._setup = setup = self._drawn(options or {})
-        friction = self._friction.copy()
-        friction[self._own] *= setup["friction"]
-        self.model.geom_friction[:] = friction
+        setup = self._drawn(options or {})
+        self._nominal.apply(setup["variation"])
 
         def place(data: mujoco.MjData) -> None:
             turn = [np.cos(setup["yaw"] / 2.0), 0.0, 0.0, np.sin(setup["yaw"] / 2.0)]
@@ -237,25 +235,33 @@ class TetrapodCourse(SimulatedTask):
             "yaw": random.uniform(-1.0, 1.0) * np.radians(2.0),
             "friction": 1.0,
             "randomise": 0.0,
+            "randomise_robot": 0.0,
         }
-        side = random.uniform(-1.0, 1.0)
-        unknown = [key for key in options if key not in drawn]
+        draws = random.uniform(-1.0, 1.0, len(Variation.names())).tolist()
+        known = [*drawn, *Variation.names()[1:]]
+        unknown = [key for key in options if key not in known]
         if unknown:
-            raise ValueError(f"options must be some of {sorted(drawn)}, got {unknown}")
+            raise ValueError(f"options must be some of {sorted(known)}, got {unknown}")
         setup = drawn | dict(options)
         for key, shape, low, high in (
             ("position", (2,), -5e-3, 5e-3),
             ("yaw", (), -np.radians(3.0), np.radians(3.0)),
             ("friction", (), 0.5, 1.5),
             ("randomise", (), 0.0, 0.5),
+            ("randomise_robot", (), 0.0, 0.5),
         ):
             value = numbers(key, setup[key], shape)
             if value.min() < low - 1e-12 or value.max() > high + 1e-12:
                 raise ValueError(f"{key} must be between {low:g} and {high:g}, got {setup[key]}")
             setup[key] = value
-        if "friction" not in options:
-            setup["friction"] = 1.0 + float(setup["randomise"]) * side
-        return setup
+        given = {
+            name: float(numbers(name, setup[name], ()))
+            for name in Variation.names()
+            if name in options
+        }
+        varied = asdict(Variation.drawn(draws, float(setup["randomise_robot"])))
+        varied["friction"] = 1.0 + float(setup["randomise"]) * draws[0]
+        return setup | {"variation": Variation(**(varied | given))}
 
     def begin(self, command: NDArray[np.float64]) -> Drive:
         """Power of the TCAs and voltage of the heaters; see the class."""
@@ -363,5 +369,5 @@ class TetrapodCourse(SimulatedTask):
             "damaged": sim.spines.damaged.copy(),
             "body_angle": self.body_angle,
             "position": self.position.copy(),
-            "friction": float(self._setup.get("friction", 1.0)),
+            "variation": asdict(self._nominal.variation),
         }

@@ -3,6 +3,7 @@
 import hashlib
 import pickle
 import warnings
+from dataclasses import asdict
 
 import gymnasium as gym
 import numpy as np
@@ -13,6 +14,7 @@ from tca_mj.agents.course import CRAWL, PUSH, SHIMMY, STEP, WALK, Bend, CourseWa
 from tca_mj.agents.demo import tetrapod_course
 from tca_mj.cli import outcome, speed_table
 from tca_mj.envs.course import ACTION, OBSERVATION, TetrapodCourse
+from tca_mj.variation import Variation
 
 ID = "TCA/TetrapodCourse-v0"
 OFF = -np.ones(ACTION.size, dtype=np.float32)
@@ -39,7 +41,7 @@ def rollout(env, seed=7, steps=3):
     digest = hashlib.sha256()
     observation, info = env.reset(seed=seed, options={"randomise": 0.2})
     actions = np.random.default_rng(seed)
-    digest.update(observation.tobytes() + np.float64(info["friction"]).tobytes())
+    digest.update(observation.tobytes() + np.float64(info["variation"]["friction"]).tobytes())
     for _ in range(steps):
         action = actions.uniform(-1.0, 1.0, ACTION.size).astype(np.float32)
         observation, reward, terminated, truncated, info = env.step(action)
@@ -121,6 +123,8 @@ def test_an_action_is_power_and_voltage(shared):
         ({"height": 1.0}, "options"),
         ({"friction": 2.0}, "friction must be between 0.5 and 1.5"),
         ({"randomise": 0.6}, "randomise"),
+        ({"randomise_robot": -0.1}, "randomise_robot must be between 0 and 0.5"),
+        ({"mass": 0.0}, "mass must be finite and above 0"),
         ({"position": [0.1, 0.0]}, "position"),
         ({"yaw": "left"}, "yaw"),
     ],
@@ -145,13 +149,30 @@ def test_friction_is_drawn_and_forgotten(shared):
     drawn = []
     for seed in range(6):
         _, info = shared.reset(seed=seed, options={"randomise": 0.2})
-        drawn.append(info["friction"])
+        drawn.append(info["variation"]["friction"])
         assert shared.model.geom_friction[foot, 0] == pytest.approx(
-            info["friction"] * shared.robot.leg.friction
+            drawn[-1] * shared.robot.leg.friction
         )
+        assert info["variation"] | {"friction": 1.0} == asdict(Variation())
     assert 0.8 <= min(drawn) < 0.95 and 1.05 < max(drawn) <= 1.2
     shared.reset(seed=0)
     assert shared.model.geom_friction[foot, 0] == shared.robot.leg.friction
+
+
+def test_the_robot_is_varied_and_restored(shared):
+    """Everything but friction by one option, single fields by their names; nothing stays."""
+    mass = shared.model.body_mass.sum()
+    _, info = shared.reset(seed=1, options={"randomise_robot": 0.2, "ambient": 20.0})
+    varied = info["variation"]
+    assert varied["friction"] == 1.0 and varied["ambient"] == 20.0
+    off = [abs(varied[name] - 1.0) for name in ("mass", "tca_gain", "heat_loss")]
+    assert all(0.0 < share <= 0.2 for share in off) and len(set(off)) == 3
+    assert shared.model.body_mass.sum() == pytest.approx(varied["mass"] * mass)
+    assert shared.sim.gain == varied["tca_gain"]
+    assert (shared.sim.temperature == 20.0).all() and (shared.sim.spines.temperature == 20.0).all()
+    _, info = shared.reset(seed=1)
+    assert info["variation"] == asdict(Variation())
+    assert shared.model.body_mass.sum() == mass and (shared.sim.temperature == 25.0).all()
 
 
 def test_touching_the_plate_is_seen_and_spoils_success(shared):
