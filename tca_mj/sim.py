@@ -30,7 +30,7 @@ from tca_mj.tca.arrays import floats
 
 _TAUT = 1e-10  # tension added to each TCA's law, so that at rest it is taut [N]
 # Warnings after which MuJoCo has reset the state by itself.
-_DIVERGENCE = {
+DIVERGENCE = {
     int(warning): str(warning).rsplit("_", 1)[-1]
     for warning in (
         mujoco.mjtWarning.mjWARN_BADQPOS,
@@ -72,6 +72,13 @@ class Simulation:
         tca_names: Names, in the order of the actuator axis.
         tendon: Ids of their tendons in ``model``, shape (n,).
         tca_period: Time between two updates of the TCAs [s].
+        substeps: Number of physics steps in it.
+        power: Electrical power of the last step, shape (n,) [W].
+        body: The springs that stand for its cells.
+        strained: The cells at the last update.
+        actuator: Ids of the TCAs' actuators, shape (n,).
+        steadiness: Time over which the damping of taut tendons is made, see ``body`` [s].
+        length_offset: Lengths of the TCAs over those of their curves in ``body``, shape (n,) [m].
         spines: The shape-memory spines, if there are any.
         gain: Factor of every tension over the TCAs' law, see ``tca_mj.variation``.
     """
@@ -113,19 +120,19 @@ class Simulation:
         self.tca_period = tca_period
         self.tca_names = tuple(tca.name for tca in part.tcas)
         self.bank = _bank(tuple(replace(tca.spec, ambient=ambient) for tca in part.tcas), law)
-        self._substeps = substeps
+        self.substeps = substeps
         self.gain = 1.0
 
         model = self.model
         self.tendon = np.array([model.tendon(name).id for name in self.tca_names], dtype=np.int64)
-        self._actuator = np.array(
+        self.actuator = np.array(
             [model.actuator(name).id for name in self.tca_names], dtype=np.int64
         )
 
-        self._body = SmoothBody(model, part.tcas)
+        self.body = SmoothBody(model, part.tcas)
         # What is renewed only every period needs more damping than the time step (by trial).
-        self._steady = max(timestep, 0.4 * tca_period)
-        self.spines = Spines(part.spines, self._body, self.tca_names, ambient)
+        self.steadiness = max(timestep, 0.4 * tca_period)
+        self.spines = Spines(part.spines, self.body, self.tca_names, ambient)
 
         # The bodies' unloaded shape is that of their springs; TCAs are measured from there.
         scalar = model.jnt_type >= int(mujoco.mjtJoint.mjJNT_SLIDE)
@@ -133,8 +140,8 @@ class Simulation:
         self.data.qpos[address] = model.qpos_spring[address]
         self._start = self.data.qpos.copy()
         rest = np.array([tca.spec.rest_length + tca.stretch for tca in part.tcas])
-        self._length_offset = np.zeros(self.n)
-        self._length_offset = rest - self.length
+        self.length_offset = np.zeros(self.n)
+        self.length_offset = rest - self.length
         self.tca: TcaState
         self.pull: Pull
         self.reset()
@@ -154,9 +161,9 @@ class Simulation:
             place(data)
         self.tca = self.bank.rest()
         self.power = np.zeros(self.n)
-        self._strained = self._body.at(data.qpos)
-        self.spines.reset(self._strained.motion)
-        self._hand_over(self.bank.pull(self.tca, self._strained.length + self._length_offset))
+        self.strained = self.body.at(data.qpos)
+        self.spines.reset(self.strained.motion)
+        self._hand_over(self.bank.pull(self.tca, self.strained.length + self.length_offset))
         mujoco.mj_forward(model, data)
 
     def _locate(self) -> None:
@@ -183,7 +190,7 @@ class Simulation:
     @property
     def length(self) -> NDArray[np.float64]:
         """Length of each TCA along its route, shape (n,) [m]."""
-        return self._body.at(self.data.qpos).length + self._length_offset
+        return self.body.at(self.data.qpos).length + self.length_offset
 
     @property
     def tension(self) -> NDArray[np.float64]:
@@ -191,7 +198,7 @@ class Simulation:
 
         It is 1e-10 N above the law's, see the top of this file.
         """
-        return 0.0 - self.data.actuator_force[self._actuator]
+        return 0.0 - self.data.actuator_force[self.actuator]
 
     @property
     def resistance(self) -> NDArray[np.float64]:
@@ -235,23 +242,13 @@ class Simulation:
             SimulationDiverged: If the state is no longer finite, or a TCA is shorter, longer or
                 hotter than its law holds for.
         """
-        power = np.array(floats("power", power))
-        if power.shape != (self.n,):
-            raise ValueError(f"power must have shape ({self.n},), got {power.shape}")
-        if not (np.isfinite(power).all() and (power >= 0.0).all()):
-            raise ValueError(f"power must be finite and at least 0 W, got {power}")
-        voltage, fan = self.spines.checked(voltage, fan)
-        updates = round(duration / self.tca_period) if np.isfinite(duration) else 0
-        if updates < 1 or abs(updates * self.tca_period - duration) > 1e-9:
-            raise ValueError(
-                f"duration must be a positive multiple of tca_period {self.tca_period} s,"
-                f" got {duration}"
-            )
+        power, voltage, fan = self.checked(power, voltage, fan)
+        updates = self.updates(duration)
         model, data = self.model, self.data
         self.power = power
         for _ in range(updates):
-            self._strained = self._body.at(data.qpos)
-            length = self._strained.length + self._length_offset
+            self.strained = self.body.at(data.qpos)
+            length = self.strained.length + self.length_offset
             self._check_length(length)
             heat = self.tca
             try:
@@ -264,26 +261,57 @@ class Simulation:
                 before = self.bank.pull(heat, length).tension
                 rise = (pull.tension - before) / self.tca_period
                 self.spines.advance(
-                    voltage, fan, self._strained.motion,
+                    voltage, fan, self.strained.motion,
                     self.gain * pull.tension, self.gain * rise, self.tca_period,
                 )  # fmt: skip
             self._hand_over(pull)
-            mujoco.mj_step(model, data, self._substeps)
+            mujoco.mj_step(model, data, self.substeps)
         self._check()
+
+    def checked(
+        self, power: ArrayLike, voltage: ArrayLike, fan: ArrayLike
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]]:
+        """Power, shape (n,), voltage and fan, shape (spines.n,) each, for ``step``.
+
+        Raises:
+            ValueError: As ``step``.
+        """
+        power = np.array(floats("power", power))
+        if power.shape != (self.n,):
+            raise ValueError(f"power must have shape ({self.n},), got {power.shape}")
+        if not (np.isfinite(power).all() and (power >= 0.0).all()):
+            raise ValueError(f"power must be finite and at least 0 W, got {power}")
+        return power, *self.spines.checked(voltage, fan)
+
+    def updates(self, duration: float) -> int:
+        """How many updates of the TCAs a duration [s] takes.
+
+        Raises:
+            ValueError: If it is no multiple of ``tca_period``.
+        """
+        updates = round(duration / self.tca_period) if np.isfinite(duration) else 0
+        if updates < 1 or abs(updates * self.tca_period - duration) > 1e-9:
+            raise ValueError(
+                f"duration must be a positive multiple of tca_period {self.tca_period} s,"
+                f" got {duration}"
+            )
+        return updates
 
     def _hand_over(self, pull: Pull) -> None:
         """Gives MuJoCo the law F + k (l' - l) and the joints the springs that go with it."""
         pull = Pull(self.gain * pull.tension, self.gain * pull.stiffness, pull.length)
         self.pull = pull
-        model = self.model
         self._locate()
-        tendon_length = self.data.ten_length[self.tendon]
-        bias = model.actuator_biasprm
-        bias[self._actuator, 0] = -(pull.tension + _TAUT) + pull.stiffness * tendon_length
-        bias[self._actuator, 1] = -pull.stiffness
+        self.set_bias(*bias(pull, self.data.ten_length[self.tendon]))
         tension = np.maximum(pull.tension, 0.0)
-        self._body.support(self.data, self._strained, tension)
-        self._body.steady(self._strained, tension, self._steady)
+        self.body.support(self.data, self.strained, tension)
+        self.body.steady(self.strained, tension, self.steadiness)
+
+    def set_bias(self, constant: NDArray[np.float64], slope: NDArray[np.float64]) -> None:
+        """Writes what ``bias`` computes, shape (n,) each, to the model."""
+        prm = self.model.actuator_biasprm
+        prm[self.actuator, 0] = constant
+        prm[self.actuator, 1] = slope
 
     def _check_length(self, length: NDArray[np.float64]) -> None:
         inside = (length > self.bank.shortest) & (length < self.bank.longest)
@@ -298,13 +326,25 @@ class Simulation:
     def _check(self) -> None:
         data = self.data
         number = data.warning.number
-        bad = [name for warning, name in _DIVERGENCE.items() if number[warning] > 0]
+        bad = [name for warning, name in DIVERGENCE.items() if number[warning] > 0]
         if bad or not (np.isfinite(data.qpos).all() and np.isfinite(data.qvel).all()):
             names = ", ".join(bad) or "not finite"
             raise SimulationDiverged(
                 f"the state diverged at {data.time:.3f} s ({names}); a smaller timestep or less"
                 " power may help"
             )
+
+
+def bias(
+    pull: Pull, tendon_length: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Constant [N] and slope [N/m] of MuJoCo's affine law of its tendon's length, (..., n) each.
+
+    Args:
+        pull: The law of the TCAs, about their present lengths.
+        tendon_length: Present lengths of the tendons, shape (..., n) [m].
+    """
+    return -(pull.tension + _TAUT) + pull.stiffness * tendon_length, -pull.stiffness
 
 
 def _bank(specs: tuple[TcaSpec, ...], law: Literal["rod", "surface"]) -> TcaBank:

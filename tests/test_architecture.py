@@ -34,6 +34,7 @@ LAYER_OF = {
     "film": "record",
     "shapes": "record",
     "variation": "sim",
+    "batch": "sim",
 }
 # Files that only high layers may import, although they themselves see only what is low:
 # figures and recordings share colours, and no physics draws.

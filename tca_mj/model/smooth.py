@@ -11,9 +11,15 @@ as in Cosserat's theory. The loads on the joints that follow, K (θ - θ0)/h + F
 hinges' axes, differ from those of MuJoCo's springs and tendons by little. The difference goes into
 the references of the springs, renewed together with the tensions, so that nothing is left of it
 in a body at rest. What is left is that a cell bends in its middle and not along an arc.
+
+What stands before the axes named below is a batch: bodies built alike, at positions of their own.
+Nothing here is rounded by a matrix product, whose order of summation depends on its size: a body
+in a batch has, bit for bit, what it has alone.
 """
 
+import math
 from collections.abc import Iterable, Sequence
+from copy import copy
 from dataclasses import dataclass
 
 import mujoco
@@ -34,31 +40,66 @@ class Strained:
     """Cells and TCAs at some positions of the joints.
 
     Attributes:
-        motion: Stretch [m] and rotation vector [rad] of each cell, shape (4, cells).
-        length: Length of the smooth curve of each TCA, shape (n,) [m].
-        each: Its length in each crossing, shape (crossings,) [m].
-        slope: Derivatives of the length of each crossing by its cell's motion, (crossings, 4).
-        half: Sine and cosine of half the angles of the hinges, shape (2, 3, cells).
-        cotangent: Half of each cell's angle times the cotangent of it, shape (cells,).
+        motion: Stretch [m] and rotation vector [rad] of each cell, shape (..., 4, cells).
+        length: Length of the smooth curve of each TCA, shape (..., n) [m].
+        each: Its length in each crossing, shape (..., crossings) [m].
+        slope: Derivatives of the length of each crossing by its cell's motion, shape
+            (..., 4, crossings).
+        sine: Sine of half the angles of the hinges, shape (..., 3, cells).
+        cosine: Cosine of them, same shape.
+        cotangent: Half of each cell's angle times the cotangent of it, shape (..., cells).
     """
 
     motion: Array
     length: Array
     each: Array
     slope: Array
-    half: Array
+    sine: Array
+    cosine: Array
     cotangent: Array
+
+    def __getitem__(self, i: int) -> "Strained":
+        """Body ``i`` of a batch."""
+        return Strained(
+            self.motion[i], self.length[i], self.each[i], self.slope[i],
+            self.sine[i], self.cosine[i], self.cotangent[i],
+        )  # fmt: skip
+
+
+def summed(values: Array, place: NDArray[np.int64], size: int) -> Array:
+    """Adds up the last axis by place, in its order; shape (..., k) to (..., size).
+
+    Args:
+        values: What is added up, shape (..., k).
+        place: Where each goes, from 0 to size - 1, shape (k,).
+        size: Number of places.
+    """
+    lead = values.shape[:-1]
+    count = math.prod(lead)
+    if lead:
+        place = (place + size * np.arange(count)[:, None]).ravel()
+    total: Array = np.bincount(place, values.ravel(), count * size).astype(np.float64, copy=False)
+    return total.reshape(*lead, size) if lead else total
+
+
+def _rows(array: Array) -> tuple[Array, ...]:
+    """The rows of the last axis but one."""
+    return tuple(array[..., i, :] for i in range(array.shape[-2]))
 
 
 class SmoothBody:
     """Cells of a compiled model and the TCAs that cross them.
 
     Attributes:
-        stiffness: Of each cell against its motion, without TCAs, shape (4, cells) [N/m, N m/rad];
-            zero for a motion that the chain leaves out.
-        rest: Motion of each cell at rest, shape (4, cells) [m, rad].
-        damping: Of each cell's motion, without TCAs, shape (4, cells) [N s/m, N m s/rad].
+        stiffness: Of each cell against its motion, without TCAs, shape (..., 4, cells)
+            [N/m, N m/rad]; zero for a motion that the chain leaves out.
+        rest: Motion of each cell at rest, shape (..., 4, cells) [m, rad].
+        damping: Of each cell's motion, without TCAs, shape (..., 4, cells) [N s/m, N m s/rad].
     """
+
+    stiffness: Array
+    rest: Array
+    damping: Array
 
     def __init__(
         self, model: mujoco.MjModel, tcas: Sequence[RoutedTca], chains: Iterable[Chain] = ()
@@ -75,7 +116,7 @@ class SmoothBody:
         cells |= {tuple(crossing.joints.values()): crossing.joints for crossing in crossings}
         number = {key: i for i, key in enumerate(cells)}
         self._model = model
-        self._last: tuple[Array, Strained] | None = None  # asked for again at the next update
+        self._last: tuple[bytes, Strained] | None = None  # asked for again at the next update
         self._tca = np.array([i for i, tca in enumerate(tcas) for _ in tca.crossings], np.int64)
         self._cell = np.array([number[tuple(c.joints.values())] for c in crossings], np.int64)
         self._read_cells(list(cells.values()))
@@ -83,6 +124,23 @@ class SmoothBody:
         self._read_tendons([model.tendon(tca.name).id for tca in tcas])
         self._read_polylines(crossings)
         self.rest = self.at(model.qpos_spring).motion.copy()
+
+    @classmethod
+    def batch(cls, bodies: Sequence["SmoothBody"]) -> "SmoothBody":
+        """Bodies built alike as one, with an axis of bodies before all others.
+
+        It computes for all of them what each computes for itself, and writes to no model.
+        """
+        every = copy(bodies[0])
+        every._last = None
+        every.gather(bodies)
+        return every
+
+    def gather(self, bodies: Sequence["SmoothBody"]) -> None:
+        """Takes stiffness, rest and damping over from the bodies of the batch."""
+        self.stiffness = np.stack([body.stiffness for body in bodies])
+        self.rest = np.stack([body.rest for body in bodies])
+        self.damping = np.stack([body.damping for body in bodies])
 
     def _read_cells(self, cells: Sequence[dict[Motion, str]]) -> None:
         """Which joint is which motion of which cell."""
@@ -96,19 +154,18 @@ class SmoothBody:
                 self._order[i] = -1.0
         self._half, self._twice = 0.5 * self._order, 2.0 * self._order
         self._shape = shape
+        self.damping, self.stiffness = np.zeros((2, *shape))
         self._where = np.flatnonzero(joint >= 0)
         # A slice where no motion is left out: a view instead of a copy.
         self._held = slice(None) if len(self._where) == joint.size else self._where
         self._joint = joint.ravel()[self._where]
         self._qpos, self._dof = model.jnt_qposadr[self._joint], model.jnt_dofadr[self._joint]
-        self.damping = np.zeros(shape)
         self.damping.flat[self._where] = model.dof_damping[self._dof]
-        self.stiffness = np.zeros(shape)
         self.stiffness.flat[self._where] = model.jnt_stiffness[self._joint]
 
     def _read_curves(self, crossings: Sequence[Crossing], tcas: int) -> None:
-        """w = tangent + lever @ motion at the points of a crossing."""
-        count, rows = len(crossings), 3 * len(_POINTS)
+        """Offsets and their slopes at the points of each crossing, shape (points, 1, crossings)."""
+        count = len(crossings)
         self._h = np.array([crossing.cell for crossing in crossings])
         offset, slope = np.empty((2, count, len(_POINTS), 2))
         for i, crossing in enumerate(crossings):
@@ -116,18 +173,11 @@ class SmoothBody:
             s = start + (end - start) * _POINTS
             offset[i] = crossing.leg.offset(s)
             slope[i] = crossing.leg.slope(s) * (end - start) / crossing.cell
-        x, y = np.moveaxis(offset, -1, 0)
-        zero, one = np.zeros_like(x), np.ones_like(x)
-        lever = np.array([[zero, zero, zero, -y], [zero, zero, zero, x], [one, y, -x, zero]])
-        lever = np.moveaxis(lever, (0, 1), (2, 3)) / self._h[:, None, None, None]
-        self._lever = lever.reshape(count, rows, len(MOTIONS))
-        self._tangent = np.concatenate([slope, one[..., None]], axis=-1).reshape(count, rows)
-        self._weight = self._h[:, None] * _WEIGHTS
-        # Sums over the crossings of a cell and of a TCA.
-        self._into_cells = np.zeros((count, self._shape[1]))
-        self._into_cells[np.arange(count), self._cell] = 1.0
-        self._into_tcas = np.zeros((count, tcas))
-        self._into_tcas[np.arange(count), self._tca] = 1.0
+        self._x, self._y = np.ascontiguousarray(offset.T)[:, :, None]
+        self._dx, self._dy = np.ascontiguousarray(slope.T)[:, :, None]
+        # Where the motions of each crossing's cell are, shape (4 crossings,).
+        self._cells = (np.arange(len(MOTIONS))[:, None] * self._shape[1] + self._cell).ravel()
+        self._tcas = tcas
 
     def _read_tendons(self, tendons: Sequence[int]) -> None:
         """Where MuJoCo keeps the tendons' derivatives by the cells' joints, in a sparse matrix."""
@@ -152,18 +202,24 @@ class SmoothBody:
         for i, crossing in enumerate(crossings):
             for motion, curving in crossing.polyline.items():
                 polyline[i, MOTIONS.index(motion)] = curving
-        # d²|w| = (|dw|² - (dw·w/|w|)²)/|w| in the straight body.
-        shape = (len(crossings), len(_POINTS), 3, len(MOTIONS))
-        w, lever = self._tangent.reshape(shape[:3]), self._lever.reshape(shape)
-        norm = np.linalg.norm(w, axis=-1)[..., None]
-        along = np.einsum("kgi,kgim->kgm", w / norm, lever)
-        curving = (np.sum(lever**2, axis=2) - along**2) / norm
-        more = np.einsum("kg,kgm->km", self._weight, curving) - polyline
-        more[:, [MOTIONS.index("stretch"), MOTIONS.index("twist")]] = 0.0
+        # d²|w| = (|dw|² - (dw·w/|w|)²)/|w| in the straight body, by the motions that bend it.
+        bends = [MOTIONS.index("bend_x"), MOTIONS.index("bend_y")]
+        per = 1.0 / self._h
+        norm = np.sqrt(self._dx**2 + self._dy**2 + 1.0)
+        more = np.zeros_like(polyline)
+        for bend, lever in zip(bends, (self._y * per, -self._x * per), strict=True):
+            curved = (lever**2 - (lever / norm) ** 2) / norm
+            more[:, bend] = np.sum(_WEIGHTS[:, None, None] * curved, axis=0)[0] * self._h
+            more[:, bend] -= polyline[:, bend]
+        length = np.sum(_WEIGHTS[:, None, None] * norm, axis=0)[0] * self._h
+        self._twist = polyline[:, MOTIONS.index("twist")] * length
 
-        self._twist = polyline[:, MOTIONS.index("twist")] * np.sum(norm[..., 0] * self._weight, 1)
-        total = np.einsum("km,kc,kn->mcn", more, self._into_cells, self._into_tcas)
-        self._more = total[np.unravel_index(self._where, self._shape)]
+        total = np.zeros((*self._shape, self._tcas))
+        for i in bends:
+            np.add.at(total[i], (self._cell, self._tca), more[:, i])
+        total = total[np.unravel_index(self._where, self._shape)]
+        joint, tca = np.nonzero(total)
+        self._more = joint, tca, total[joint, tca]
 
     @np.errstate(invalid="ignore", over="ignore")  # a diverged state has no shape
     def at(self, qpos: Array) -> Strained:
@@ -172,36 +228,85 @@ class SmoothBody:
         The hinges of a cell turn about x, y, z in this order: the product of three quaternions.
         In the reversed order they turn the reversed way if the angles are reversed.
         """
-        position = qpos[self._qpos]
-        if self._last is not None and np.array_equal(position, self._last[0]):
+        position = qpos.take(self._qpos, axis=-1)
+        key = position.tobytes()  # bits: 0 and -0 are not the same
+        if self._last is not None and key == self._last[0]:
             return self._last[1]
-        motion = np.zeros(self._shape)
-        motion.reshape(-1)[self._held] = position
-        angles = self._half * motion[1:]
-        half = np.empty((2, *angles.shape))
-        (sx, sy, sz), (cx, cy, cz) = np.sin(angles, out=half[0]), np.cos(angles, out=half[1])
+        lead = position.shape[:-1]
+        motion = np.zeros((*lead, self._shape[0] * self._shape[1]))
+        motion[..., self._held] = position
+        motion = motion.reshape(*lead, *self._shape)
+        angles = self._half * motion[..., 1:, :]
+        sine, cosine = np.sin(angles), np.cos(angles)
+        (sx, sy, sz), (cx, cy, cz) = _rows(sine), _rows(cosine)
         ss, cc, sc, cs = sx * sy, cx * cy, sx * cy, cx * sy
-        motion[1] = sc * cz + cs * sz
-        motion[2] = cs * cz - sc * sz
-        motion[3] = cc * sz + ss * cz
-        cosine = cc * cz - ss * sz
-        # Half the angle is arctan(sine/cosine), and goes on continuously beyond half a turn.
-        sine = np.sqrt(np.einsum("ik,ik->k", motion[1:], motion[1:])) + 1e-300
-        ratio = np.arctan2(sine, cosine) / sine
-        motion[1:] *= self._twice * ratio
+        x, y, z = sc * cz + cs * sz, cs * cz - sc * sz, cc * sz + ss * cz
+        real = cc * cz - ss * sz
+        # Half the angle is arctan(imaginary/real), and goes on continuously beyond half a turn.
+        imaginary = np.sqrt(x * x + y * y + z * z) + 1e-300
+        ratio = np.arctan2(imaginary, real) / imaginary
+        factor = self._twice * ratio
+        for row, vector in zip(_rows(motion)[1:], (x, y, z), strict=True):
+            np.multiply(vector, factor, out=row)
         each, slope = self._curves(motion)
-        length = each @ self._into_tcas
-        strained = Strained(motion, length, each, slope, half, ratio * cosine)
-        self._last = position, strained
+        length = summed(each, self._tca, self._tcas)
+        strained = Strained(motion, length, each, slope, sine, cosine, ratio * real)
+        self._last = key, strained
         return strained
 
+    def keep(self, qpos: Array, strained: Strained) -> None:
+        """What ``at`` has to return for ``qpos``, computed elsewhere."""
+        self._last = qpos.take(self._qpos, axis=-1).tobytes(), strained
+
     def _curves(self, motion: Array) -> tuple[Array, Array]:
-        w = self._tangent + (self._lever @ motion.T[self._cell, :, None])[..., 0]
-        w = w.reshape(len(w), len(_POINTS), 3)
-        norm = np.sqrt(np.einsum("kgi,kgi->kg", w, w))
-        each = np.einsum("kg,kg->k", norm, self._weight)
-        w *= (self._weight / norm)[..., None]
-        return each, (w.reshape(len(w), 1, 3 * len(_POINTS)) @ self._lever)[:, 0]
+        """Length of each crossing, (..., crossings), and its slopes, (..., 4, crossings)."""
+        lead = motion.shape[:-2]
+        strain = motion.reshape(-1, *self._shape).take(self._cell, axis=-1) / self._h
+        e, u1, u2, u3 = _rows(strain)
+        x, y = self._x, self._y
+        wx = self._dx - u3 * y
+        wy = self._dy + u3 * x
+        wz = 1.0 + e + u1 * y - u2 * x
+        norm = np.sqrt(wx * wx + wy * wy + wz * wz)
+        weight = _WEIGHTS[:, None, None]
+        each = self._h * np.add.reduce(weight * norm, axis=0)
+        share = weight / norm
+        wx *= share
+        wy *= share
+        wz *= share
+        slope = np.empty_like(strain)
+        np.add.reduce(wz, axis=0, out=slope[:, 0])
+        np.add.reduce(wz * y, axis=0, out=slope[:, 1])
+        np.add.reduce(wz * -x, axis=0, out=slope[:, 2])
+        np.add.reduce(wy * x - wx * y, axis=0, out=slope[:, 3])
+        return each.reshape(*lead, -1), slope.reshape(*lead, *slope.shape[1:])
+
+    def springs(
+        self, strained: Strained, tension: Array, slope: Array, qpos: Array
+    ) -> tuple[Array, Array]:
+        """Stiffness and reference of the springs of the joints for tensions, shape (..., j) each.
+
+        Args:
+            strained: The body as it is now.
+            tension: Tensions of the TCAs, shape (..., n) [N].
+            slope: Derivatives of MuJoCo's tendons at ``qpos``, ``ten_J``, shape (..., nJten).
+            qpos: Positions of the model's joints, shape (..., nq).
+        """
+        pulls = tension.take(self._tca, axis=-1)[..., None, :] * strained.slope
+        lead = pulls.shape[:-2]
+        load = self.stiffness * (strained.motion - self.rest)
+        flat = (*lead, self._shape[0] * self._shape[1])
+        pulls = summed(pulls.reshape(*lead, -1), self._cells, flat[-1])
+        load += pulls.reshape(load.shape)
+        self._turn_to_hinges(load, strained)
+        owed = load.reshape(flat)[..., self._held]
+        entry, tca, joint = self._entries
+        pulled = tension.take(tca, axis=-1) * slope.take(entry, axis=-1)
+        owed = owed - summed(pulled, joint, len(self._where))
+        joint, tca, more = self._more
+        stiffness = self.stiffness.reshape(flat)[..., self._held]
+        stiffness = stiffness + summed(tension.take(tca, axis=-1) * more, joint, len(self._where))
+        return stiffness, qpos.take(self._qpos, axis=-1) - owed / stiffness
 
     def support(self, data: mujoco.MjData, strained: Strained, tension: Array) -> None:
         """Sets the springs for tensions at the positions in ``data``.
@@ -211,16 +316,12 @@ class SmoothBody:
             strained: The body at these positions.
             tension: Tensions of the TCAs, shape (n,) [N].
         """
-        model = self._model
-        load = self.stiffness * (strained.motion - self.rest)
-        load += (strained.slope.T * tension[self._tca]) @ self._into_cells
-        self._turn_to_hinges(load, strained)
-        entry, tca, joint = self._entries
-        owed = load.reshape(-1)[self._held]
-        owed -= np.bincount(joint, tension[tca] * data.ten_J[entry], len(owed))
-        stiffness = self.stiffness.reshape(-1)[self._held] + self._more @ tension
-        model.jnt_stiffness[self._joint] = stiffness
-        model.qpos_spring[self._qpos] = data.qpos[self._qpos] - owed / stiffness
+        self.set_springs(*self.springs(strained, tension, data.ten_J, data.qpos))
+
+    def set_springs(self, stiffness: Array, reference: Array) -> None:
+        """Writes what ``springs`` computes, shape (j,) each, to the model."""
+        self._model.jnt_stiffness[self._joint] = stiffness
+        self._model.qpos_spring[self._qpos] = reference
 
     def places(self, joints: Sequence[str]) -> NDArray[np.int64]:
         """Indices of joints in the flattened arrays of shape (4, cells).
@@ -236,8 +337,8 @@ class SmoothBody:
         except KeyError as error:
             raise ValueError(f"joints must be of cells that a TCA crosses, got {joints}") from error
 
-    def steady(self, strained: Strained, tension: Array, time: float) -> None:
-        """Keeps taut tendons from chattering.
+    def damped(self, strained: Strained, tension: Array, time: float) -> Array:
+        """Damping of the joints that keeps taut tendons from chattering, shape (..., j).
 
         MuJoCo takes the stiffness that they have by changing their direction explicitly. Damping,
         which is implicit, of that stiffness times the time step makes it stable at any tension.
@@ -246,31 +347,45 @@ class SmoothBody:
 
         Args:
             strained: The body as it is now.
-            tension: Tensions of the TCAs, shape (n,) [N].
+            tension: Tensions of the TCAs, shape (..., n) [N].
             time: Damping over that stiffness, at least the time step [s].
         """
-        twist = (time * tension[self._tca] * self._twist / strained.each) @ self._into_cells
+        tension = tension.take(self._tca, axis=-1)
+        twist = summed(time * tension * self._twist / strained.each, self._cell, self._shape[1])
         damping = self.damping.copy()
-        damping[1] += 0.25 * strained.motion[2] ** 2 * twist
-        damping[2] += 0.25 * strained.motion[1] ** 2 * twist
-        damping[3] += twist
-        self._model.dof_damping[self._dof] = damping.reshape(-1)[self._held]
+        _, bend_x, bend_y, _ = _rows(strained.motion)
+        _, across_y, across_x, along = _rows(damping)
+        across_y += 0.25 * bend_y**2 * twist
+        across_x += 0.25 * bend_x**2 * twist
+        along += twist
+        lead = damping.shape[:-2]
+        return damping.reshape(*lead, -1)[..., self._held]
+
+    def steady(self, strained: Strained, tension: Array, time: float) -> None:
+        """Keeps taut tendons from chattering: sets the damping of ``damped``, shape (n,)."""
+        self.set_damping(self.damped(strained, tension, time))
+
+    def set_damping(self, damping: Array) -> None:
+        """Writes what ``damped`` computes, shape (j,), to the model."""
+        self._model.dof_damping[self._dof] = damping
 
     def _turn_to_hinges(self, load: Array, strained: Strained) -> None:
-        """Turns the moments on the rotation vectors, load[1:], to moments about the hinges."""
-        t, m = self._order * strained.motion[1:], load[1:]
-        (tx, ty, tz), (mx, my, mz) = t, m
+        """Turns the moments on the rotation vectors, rows 1 to 3, to moments about the hinges."""
+        tx, ty, tz = _rows(self._order * strained.motion[..., 1:, :])
+        row_x, row_y, row_z = _rows(load)[1:]
+        mx, my, mz = row_x.copy(), row_y.copy(), row_z.copy()
         # By the transposed derivative of the logarithm, m - t × m/2 + c t × (t × m).
-        square = np.einsum("ik,ik->k", t, t)
-        c = (1.0 - strained.cotangent) / np.maximum(square, 1e-9)
-        along = c * np.einsum("ik,ik->k", t, m)
-        turned = strained.cotangent * m + along * t
-        m0 = turned[0] - 0.5 * (ty * mz - tz * my)
-        m1 = turned[1] - 0.5 * (tz * mx - tx * mz)
-        m2 = turned[2] - 0.5 * (tx * my - ty * mx)
+        square = tx * tx + ty * ty + tz * tz
+        cotangent = strained.cotangent
+        c = (1.0 - cotangent) / np.maximum(square, 1e-9)
+        along = c * (tx * mx + ty * my + tz * mz)
+        m0 = cotangent * mx + along * tx - 0.5 * (ty * mz - tz * my)
+        m1 = cotangent * my + along * ty - 0.5 * (tz * mx - tx * mz)
+        m2 = cotangent * mz + along * tz - 0.5 * (tx * my - ty * mx)
         # The axes of the outer hinges as the inner ones have turned them.
-        sine = 2.0 * strained.half[0, 1:] * strained.half[1, 1:]
-        (sy, sz), (cy, cz) = sine, 1.0 - 2.0 * strained.half[0, 1:] ** 2
-        load[1] = cy * (cz * m0 - sz * m1) + sy * m2
-        load[2] = sz * m0 + cz * m1
-        load[3] = m2
+        half = strained.sine[..., 1:, :]
+        sy, sz = _rows(2.0 * half * strained.cosine[..., 1:, :])
+        cy, cz = _rows(1.0 - 2.0 * half**2)
+        np.add(cy * (cz * m0 - sz * m1), sy * m2, out=row_x)
+        np.add(sz * m0, cz * m1, out=row_y)
+        row_z[...] = m2

@@ -1,7 +1,13 @@
-"""Numbers from outside: real floats or a clear refusal."""
+"""Numbers from outside, real floats or a clear refusal; and dataclasses of arrays stacked."""
+
+from collections.abc import Sequence
+from dataclasses import fields, is_dataclass, replace
+from typing import Any, TypeVar, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+
+Value = TypeVar("Value")
 
 
 def floats(name: str, values: ArrayLike) -> NDArray[np.float64]:
@@ -28,3 +34,27 @@ def floats(name: str, values: ArrayLike) -> NDArray[np.float64]:
     except (OverflowError, TypeError, ValueError) as error:
         text = f"{name} = {values!r} must be a real number or an array of them"
         raise ValueError(text) from error
+
+
+def stacked(values: Sequence[Value]) -> Value:
+    """Dataclasses of arrays as one, with an axis for them before all others.
+
+    Fields that are dataclasses themselves are stacked alike.
+    """
+    first: Any = values[0]
+    if not is_dataclass(first):
+        return cast(Value, np.stack(cast(Any, values)))
+    parts = {
+        field.name: stacked([getattr(value, field.name) for value in values])
+        for field in fields(first)
+    }
+    return cast(Value, replace(cast(Any, first), **parts))
+
+
+def row(values: Value, i: int) -> Value:
+    """The ``i``-th of what ``stacked`` has made one."""
+    every: Any = values
+    if not is_dataclass(every):
+        return cast(Value, every[i])
+    parts = {field.name: row(getattr(every, field.name), i) for field in fields(every)}
+    return cast(Value, replace(cast(Any, every), **parts))

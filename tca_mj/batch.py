@@ -1,0 +1,240 @@
+"""Simulations of one built part, stepped together on the threads of ``mujoco.batch``.
+
+Every simulation goes where it goes alone, bit for bit. Between two steps a ``Simulation`` is the
+whole truth about itself: it can be read, reset, changed or stepped on its own at will, and its
+model may have friction, masses or heat losses of its own. A step takes all states over from the
+simulations, advances them, and gives them back.
+
+TCAs, springs and spines are computed for all simulations in one go, by the code that a single
+one uses, with an axis of simulations before all others. Only the ordinary course of a step is
+computed so. Whatever is out of the ordinary (a length or a temperature for which there is no law,
+a state that MuJoCo complains of) makes a simulation go through the step again on its own, from
+where it was, so that it breaks off exactly as it would have alone, and touches no other.
+"""
+
+from collections.abc import Sequence
+from copy import copy
+from typing import Any
+
+import mujoco
+import mujoco.batch
+import numpy as np
+from numpy.typing import NDArray
+
+from tca_mj.model.smooth import SmoothBody, Strained
+from tca_mj.model.spines import Spines
+from tca_mj.sim import DIVERGENCE, Drive, Simulation, SimulationDiverged, bias
+from tca_mj.tca import CoilSolveError, Pull, TcaBank, TcaState
+from tca_mj.tca.arrays import row, stacked
+
+Array = NDArray[np.float64]
+
+_STATE = int(mujoco.mjtState.mjSTATE_INTEGRATION)
+_POSITIONS = int(mujoco.mjtStage.mjSTAGE_POS)
+_NOTHING = int(mujoco.mjtStage.mjSTAGE_NONE)
+
+
+class SimulationBatch:
+    """n simulations built alike, stepped together.
+
+    Attributes:
+        sims: The simulations.
+        threads: Threads on which MuJoCo runs; the result does not depend on it.
+    """
+
+    def __init__(self, sims: Sequence[Simulation], *, threads: int = 1) -> None:
+        """Takes simulations of the same part with the same time steps.
+
+        Raises:
+            ValueError: If there is none, they differ, one is there twice, or ``threads`` is
+                below 1.
+        """
+        self.sims = tuple(sims)
+        if not self.sims:
+            raise ValueError("sims is empty; a batch needs at least 1 simulation")
+        if threads < 1:
+            raise ValueError(f"threads must be at least 1, got {threads}")
+        if len({id(sim) for sim in self.sims}) < len(self.sims):
+            raise ValueError("sims must be different objects")
+        first = self.sims[0]
+        other = [i for i, sim in enumerate(self.sims) if not _alike(first, sim)]
+        if other:
+            raise ValueError(f"sims must be built alike, number {other[0]} is not as the first")
+        self.threads = threads
+        models = [sim.model for sim in self.sims]
+        self._batch = mujoco.batch.Batch(
+            first.model, len(self.sims), min(threads, len(self.sims)), persistent=True
+        )
+        self._batch.set_models(models)
+        self._models = models
+        self._tendon_length, self._tendon_slope = (
+            self._batch.bind(name) for name in ("ten_length", "ten_J")
+        )
+        self._body = SmoothBody.batch([sim.body for sim in self.sims])
+
+    def step(
+        self, drives: Sequence[Drive | None], duration: float
+    ) -> list[SimulationDiverged | None]:
+        """Advances each simulation by ``duration`` [s] as ``Simulation.step`` does.
+
+        Args:
+            drives: What drives each of them; None lets one stand still.
+            duration: Time to advance by [s].
+
+        Returns:
+            For each, why it broke off, or None.
+
+        Raises:
+            ValueError: As ``Simulation.step``; then none of them has moved.
+        """
+        if len(drives) != len(self.sims):
+            raise ValueError(f"drives must be {len(self.sims)}, got {len(drives)}")
+        updates = self.sims[0].updates(duration)
+        moving = [i for i, drive in enumerate(drives) if drive is not None]
+        inputs = [
+            sim.checked(drive.power, drive.voltage, drive.fan)
+            for sim, drive in zip(self.sims, drives, strict=True)
+            if drive is not None
+        ]
+        errors: list[SimulationDiverged | None] = [None] * len(self.sims)
+        if not moving:
+            return errors
+        try:
+            strayed = self._run(np.array(moving), inputs, updates)
+        except (CoilSolveError, ValueError, mujoco.batch.SimulationError):
+            strayed = moving
+        for i in strayed:
+            drive = drives[i]
+            assert drive is not None
+            try:
+                self.sims[i].step(drive.power, duration, voltage=drive.voltage, fan=drive.fan)
+            except SimulationDiverged as error:
+                errors[i] = error
+        return errors
+
+    def _run(self, ids: NDArray[np.int64], inputs: Sequence[Any], updates: int) -> Sequence[int]:
+        """The ordinary course of ``step`` for the simulations ``ids``.
+
+        Returns:
+            Those for which it is not the right one, and which are as they were before.
+        """
+        sims, batch = [self.sims[i] for i in ids], self._batch
+        every = _Every(self._body, sims, inputs)
+        which = None if len(ids) == len(self.sims) else ids
+        rows: Any = slice(None) if which is None else ids
+        for i, sim in zip(ids, sims, strict=True):
+            mujoco.mj_getState(sim.model, sim.data, batch.state[i], _STATE)
+            batch.warning[i, :, 0] = sim.data.warning.lastinfo
+            batch.warning[i, :, 1] = sim.data.warning.number
+        batch.set_models(self._models)
+        batch.forward(which, _POSITIONS)
+        astray = np.zeros(len(ids), dtype=bool)
+        for left in reversed(range(updates)):
+            astray |= every.advance(batch.qpos[rows])
+            every.hand_over(
+                np.flatnonzero(~astray),
+                batch.qpos[rows],
+                self._tendon_length[rows],
+                self._tendon_slope[rows],
+            )
+            batch.set_models(self._models)  # which were written to
+            batch.step(which, sims[0].substeps, _POSITIONS if left else _NOTHING)
+        astray |= (batch.warning[rows][:, list(DIVERGENCE), 1] > 0).any(axis=-1)
+        for name in ("qpos", "qvel"):
+            astray |= ~np.isfinite(batch.bind(name)[rows]).all(axis=-1)
+        every.settle(batch.qpos[rows])
+        for k in np.flatnonzero(~astray):
+            batch.get_data(int(ids[k]), sims[k].data)
+            every.give_back(int(k))
+        return [int(i) for i in ids[astray]]
+
+
+def _alike(first: Simulation, other: Simulation) -> bool:
+    """Whether two simulations were built of the same part, with the same time steps."""
+    return (
+        first.tca_names == other.tca_names
+        and first.spines.names == other.spines.names
+        and (first.substeps, first.tca_period) == (other.substeps, other.tca_period)
+        and (first.bank.law, first.bank.specs) == (other.bank.law, other.bank.specs)
+        and np.array_equal(first.length_offset, other.length_offset)
+    )
+
+
+class _Every:
+    """State and constants of some simulations, with an axis for them before all others."""
+
+    def __init__(
+        self,
+        body: SmoothBody,
+        sims: Sequence[Simulation],
+        inputs: Sequence[tuple[Array, Array, NDArray[np.bool_]]],
+    ) -> None:
+        first = sims[0]
+        self.sims = sims
+        self.power, self.voltage, self.fan = (
+            np.stack(values) for values in zip(*inputs, strict=True)
+        )
+        self.period, self.steadiness = first.tca_period, first.steadiness
+        self.bank: TcaBank = copy(first.bank)
+        self.bank.heat = stacked([sim.bank.heat for sim in sims])
+        self.tca: TcaState = stacked([sim.tca for sim in sims])
+        self.gain = np.array([[sim.gain] for sim in sims])
+        self.offset = np.stack([sim.length_offset for sim in sims])
+        self.body = body
+        self.body.gather([sim.body for sim in sims])
+        self.spines = Spines.batch([sim.spines for sim in sims], self.body)
+        self.pull: Pull
+        self.strained: Strained
+        self.now: tuple[Array, Strained]
+
+    def advance(self, qpos: Array) -> NDArray[np.bool_]:
+        """Heats TCAs and spines for a period; where a length has no law, shape (m,)."""
+        strained = self.strained = self.body.at(qpos)
+        length = strained.length + self.offset
+        inside = (length > self.bank.shortest) & (length < self.bank.longest)
+        astray: NDArray[np.bool_] = np.logical_not(inside.all(axis=-1))
+        motion = strained.motion
+        if astray.any():  # is thrown away, and must not stop the others
+            length = np.where(inside, length, self.bank.rest_length)
+            motion = np.where(astray[:, None, None], self.body.rest, motion)
+        heat = self.tca
+        self.tca, pull = self.bank.advance(heat, self.power, length, self.period)
+        if self.spines.n:
+            before = self.bank.pull(heat, length).tension
+            rise = (pull.tension - before) / self.period
+            self.spines.advance(
+                self.voltage, self.fan, motion,
+                self.gain * pull.tension, self.gain * rise, self.period,
+            )  # fmt: skip
+        self.pull = Pull(self.gain * pull.tension, self.gain * pull.stiffness, pull.length)
+        return astray
+
+    def hand_over(
+        self, which: NDArray[np.int64], qpos: Array, tendon_length: Array, tendon_slope: Array
+    ) -> None:
+        """Writes what MuJoCo has to know to the models of the simulations ``which``."""
+        tendon = tendon_length.take(self.sims[0].tendon, axis=-1)
+        constant, slope = bias(self.pull, tendon)
+        tension = np.maximum(self.pull.tension, 0.0)
+        stiffness, reference = self.body.springs(self.strained, tension, tendon_slope, qpos)
+        damping = self.body.damped(self.strained, tension, self.steadiness)
+        for k in which:
+            sim = self.sims[k]
+            sim.set_bias(constant[k], slope[k])
+            sim.body.set_springs(stiffness[k], reference[k])
+            sim.body.set_damping(damping[k])
+
+    def settle(self, qpos: Array) -> None:
+        """Computes the bodies where they are now, which tasks ask for next."""
+        self.now = qpos.copy(), self.body.at(qpos)
+
+    def give_back(self, k: int) -> None:
+        """Makes simulation ``k`` what a step of its own would have made of it."""
+        sim, pull = self.sims[k], self.pull
+        sim.power = self.power[k]
+        sim.tca = row(self.tca, k)
+        sim.pull = Pull(pull.tension[k], pull.stiffness[k], pull.length[k])
+        sim.strained = self.strained[k]
+        self.spines.give_back(k, sim.spines)
+        qpos, strained = self.now
+        sim.body.keep(qpos[k], strained[k])
