@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Mapping
+from functools import partial
 from typing import Any, ClassVar
 
 import mujoco
@@ -12,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from tca_mj.assets import mjcf
 from tca_mj.envs.base import Observation, Outcome, SimulatedTask
 from tca_mj.envs.table import Entry, Table, numbers
+from tca_mj.envs.vector import TaskVector
 from tca_mj.model.scene import scene
 from tca_mj.robots.arm import ArmSpec, arm
 from tca_mj.sim import Drive, Simulation, SimulationDiverged
@@ -348,3 +350,7 @@ class ArmPickPlace(SimulatedTask):
             "temperature": sim.temperature.copy(),
             "tension": sim.tension.copy(),
         }
+
+
+ArmPickPlaceVector = partial(TaskVector, ArmPickPlace)
+"""Several of them as one vector environment, made by ``gymnasium.make_vec``."""

@@ -1,6 +1,7 @@
 """``TCA/TetrapodCourse-v0``: under a plate, over a beam, to a target (Sun, Section 6.3.2)."""
 
 from dataclasses import asdict, dataclass
+from functools import partial
 from typing import Any, ClassVar
 
 import mujoco
@@ -12,6 +13,7 @@ from tca_mj.envs.base import Observation, Outcome, SimulatedTask
 from tca_mj.envs.stance import CAMERAS as FOLLOWING
 from tca_mj.envs.stance import tetrapod_scene
 from tca_mj.envs.table import Entry, Table, numbers
+from tca_mj.envs.vector import TaskVector
 from tca_mj.robots.tetrapod import LEGS, SPINES, TetrapodSpec
 from tca_mj.sim import Drive, SimulationDiverged
 from tca_mj.smp import HeaterSpec, SpineSpec
@@ -371,3 +373,7 @@ class TetrapodCourse(SimulatedTask):
             "position": self.position.copy(),
             "variation": asdict(self._nominal.variation),
         }
+
+
+TetrapodCourseVector = partial(TaskVector, TetrapodCourse)
+"""Several of them as one vector environment, made by ``gymnasium.make_vec``."""

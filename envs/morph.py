@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Mapping
+from functools import partial
 from typing import Any
 
 import mujoco
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 from tca_mj.assets import mjcf
 from tca_mj.envs.base import Observation, Outcome, SimulatedTask
 from tca_mj.envs.table import Entry, Table, numbers
+from tca_mj.envs.vector import TaskVector
 from tca_mj.model.part import Part, new_spec
 from tca_mj.model.scene import scene
 from tca_mj.modules.morphing import MorphingSpec, morphing_module
@@ -328,3 +330,7 @@ def hanging_module(spec: MorphingSpec) -> Part:
     robot = Part(mjspec)
     robot.attach(morphing_module(spec), to="clamp", prefix="module")
     return scene(mjcf("arena.xml"), robot, {"stand": mjcf("morph_stand.xml")}, name="bench")
+
+
+MorphModuleVector = partial(TaskVector, MorphModule)
+"""Several of them as one vector environment, made by ``gymnasium.make_vec``."""

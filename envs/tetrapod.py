@@ -3,6 +3,7 @@
 import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
+from functools import partial
 from typing import Any, ClassVar
 
 import numpy as np
@@ -12,6 +13,7 @@ from tca_mj.assets import mjcf
 from tca_mj.envs.base import Observation, Outcome, SimulatedTask
 from tca_mj.envs.stance import CAMERAS, LEG_TCAS, Stance, tetrapod_scene
 from tca_mj.envs.table import Entry, Table, numbers
+from tca_mj.envs.vector import TaskVector
 from tca_mj.robots.tetrapod import TetrapodSpec
 from tca_mj.sim import Drive, SimulationDiverged
 from tca_mj.variation import Nominal, Variation
@@ -331,3 +333,7 @@ class TetrapodGait(SimulatedTask):
             "tension": sim.tension.copy(),
             "variation": asdict(self.variation),
         }
+
+
+TetrapodGaitVector = partial(TaskVector, TetrapodGait)
+"""Several of them as one vector environment, made by ``gymnasium.make_vec``."""

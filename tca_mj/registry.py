@@ -28,6 +28,11 @@ class Task:
     max_episode_steps: int
     kwargs: Mapping[str, Any] = field(default_factory=dict)
 
+    @property
+    def vector_entry_point(self) -> str:
+        """``module:function`` of the vector environment: beside the class, named after it."""
+        return f"{self.entry_point}Vector"
+
 
 TASKS = (
     Task(
@@ -64,6 +69,7 @@ def register() -> None:
             gymnasium.register(
                 task.id,
                 entry_point=task.entry_point,
+                vector_entry_point=task.vector_entry_point,
                 max_episode_steps=task.max_episode_steps,
                 kwargs=dict(task.kwargs),
             )

@@ -1,0 +1,277 @@
+"""n tasks of one kind as one vector environment, whose simulations run together on threads.
+
+    envs = gymnasium.make_vec("TCA/TetrapodWalk-v0", num_envs=8, num_threads=2)
+
+Every task is, bit for bit, what ``gymnasium.make`` gives: the same seeds and actions lead to the
+same observations, rewards, flags and infos, at any number of tasks and of threads.
+"""
+
+import os
+from collections.abc import Callable, Mapping, Sequence
+from copy import deepcopy
+from typing import Any
+
+import numpy as np
+from gymnasium.error import ResetNeeded
+from gymnasium.vector import AutoresetMode, VectorEnv
+from gymnasium.vector.utils import batch_space
+from numpy.typing import NDArray
+
+from tca_mj.batch import SimulationBatch
+from tca_mj.envs.base import Observation, Outcome, SimulatedTask
+from tca_mj.envs.table import numbers
+
+Options = Mapping[str, Any] | None
+Flags = NDArray[np.bool_]
+
+
+class TaskVector(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[Any]]):
+    """Tasks of one kind, stepped together.
+
+    By default an episode that ends is followed by the next one in the same step: the observation
+    is the first one of the new episode, the last one of the old is in ``infos["final_obs"]``, its
+    info in ``infos["final_info"]``. So every step of every task is a step of its simulation, and
+    no action is thrown away. The other modes of Gymnasium are there for programs that want them.
+
+    Attributes:
+        envs: The tasks. They can be read and changed between steps.
+        num_threads: Threads on which the simulations run.
+        max_episode_steps: Steps after which an episode is truncated; None for no limit.
+        reset_options: Options of each reset that is given none of its own, as those that begin a
+            new episode by themselves; for example ``{"randomise": 0.2}``.
+    """
+
+    def __init__(
+        self,
+        task: Callable[..., SimulatedTask],
+        *,
+        num_envs: int = 1,
+        num_threads: int | None = None,
+        max_episode_steps: int | None = None,
+        autoreset_mode: AutoresetMode | str = AutoresetMode.SAME_STEP,
+        reset_options: Options = None,
+        **kwargs: Any,
+    ) -> None:
+        """Builds the task once and copies it.
+
+        Args:
+            task: Its class.
+            num_envs: Number of tasks.
+            num_threads: Threads of the simulations; None for one for each core that this process
+                may use. There are never more than tasks.
+            max_episode_steps: Steps after which an episode is truncated; None for no limit.
+            autoreset_mode: Gymnasium's mode: ``SameStep``, ``NextStep`` or ``Disabled``.
+            reset_options: Options of each reset that is given none of its own.
+            **kwargs: Arguments of the task.
+
+        Raises:
+            ValueError: If a number is below 1, the mode is unknown or the task cannot be built.
+        """
+        cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
+        threads = (cores or 1) if num_threads is None else num_threads
+        for name, value in (
+            ("num_envs", num_envs), ("num_threads", threads),
+            ("max_episode_steps", 1 if max_episode_steps is None else max_episode_steps),
+        ):  # fmt: skip
+            if value < 1:
+                raise ValueError(f"{name} must be at least 1, got {value}")
+        first = task(**kwargs)
+        self.envs: list[SimulatedTask] = [first, *(deepcopy(first) for _ in range(num_envs - 1))]
+        self.num_envs = num_envs
+        self.num_threads = min(threads, num_envs)
+        self.max_episode_steps = max_episode_steps
+        self.reset_options = reset_options
+        self.autoreset_mode = AutoresetMode(autoreset_mode)
+        self.metadata = {**first.metadata, "autoreset_mode": self.autoreset_mode}
+        self.render_mode = first.render_mode
+        self.single_action_space = first.action_space
+        self.action_space = batch_space(self.single_action_space, num_envs)
+        self.single_observation_space = first.observation_space
+        self.observation_space = batch_space(self.single_observation_space, num_envs)
+        self._observations = np.zeros(self.observation_space.shape or (), dtype=np.float32)
+        self._batch: SimulationBatch | None = None
+        self._elapsed = np.full(num_envs, -1)  # steps of the episode, -1 before the first one
+        self._over = np.zeros(num_envs, dtype=bool)
+
+    def restart(
+        self, i: int, *, seed: int | None = None, options: Options = None
+    ) -> tuple[Observation, dict[str, Any]]:
+        """Begins a new episode of task ``i``, and touches no other; errors as its ``reset``."""
+        given = self.reset_options if options is None else options
+        begun = self.envs[i].reset(seed=seed, options=None if given is None else dict(given))
+        self._elapsed[i], self._over[i] = 0, False
+        return begun
+
+    def advance(
+        self, actions: NDArray[np.float32], which: Flags | None = None
+    ) -> list[Outcome | None]:
+        """Steps tasks, and begins no new episode.
+
+        Args:
+            actions: An action for each task, of the shape of ``action_space``.
+            which: Which of them are stepped, shape (num_envs,); all by default.
+
+        Returns:
+            What the ``step`` of each returns, with the time limit; None for who is not stepped.
+
+        Raises:
+            ValueError: If the actions have the wrong shape, are not finite or out of [-1, 1].
+            ResetNeeded: If one of the tasks has not been reset.
+        """
+        commands = numbers("actions", actions, self.action_space.shape or ())
+        if np.abs(commands).max() > 1.0 + 1e-6:
+            raise ValueError(f"actions must be within -1 and 1, got {commands}")
+        commands = np.clip(commands, -1.0, 1.0)
+        stepped = np.ones(self.num_envs, dtype=bool) if which is None else which
+        if (self._elapsed[stepped] < 0).any():
+            raise ResetNeeded("the tasks must be reset before the first step")
+        if self._batch is None:
+            sims = [env.sim for env in self.envs]
+            self._batch = SimulationBatch(sims, threads=self.num_threads)
+        drives = [
+            env.begin(command) if go else None
+            for env, command, go in zip(self.envs, commands, stepped, strict=True)
+        ]
+        errors = self._batch.step(drives, self.envs[0].control_period)
+        outcomes: list[Outcome | None] = []
+        for i, (env, drive, error) in enumerate(zip(self.envs, drives, errors, strict=True)):
+            if drive is None:
+                outcomes.append(None)
+                continue
+            observation, reward, terminated, truncated, info = env.finish(drive, error)
+            self._elapsed[i] += 1
+            if self.max_episode_steps is not None:
+                truncated = truncated or bool(self._elapsed[i] >= self.max_episode_steps)
+            self._over[i] = terminated or truncated
+            outcomes.append((observation, reward, terminated, truncated, info))
+        return outcomes
+
+    def reset(
+        self,
+        *,
+        seed: int | Sequence[int | None] | None = None,
+        options: dict[str, Any] | Sequence[Options] | None = None,
+    ) -> tuple[NDArray[np.float32], dict[str, Any]]:
+        """Begins new episodes.
+
+        Args:
+            seed: Seed of the first task, of which the others take the next ones; or a seed for
+                each; or None.
+            options: Options of all resets, or those of each. ``reset_mask`` in the former, shape
+                (num_envs,), says who begins a new episode; the others are left where they are.
+
+        Raises:
+            ValueError: If there are too few seeds or options, or as the tasks' ``reset``.
+            TypeError: If ``reset_mask`` is no array of booleans.
+        """
+        seeds = self._each("seed", seed)
+        if isinstance(seed, int | np.integer):
+            seeds = [int(seed) + i for i in range(self.num_envs)]
+        mask = np.ones(self.num_envs, dtype=bool)
+        if isinstance(options, Mapping) and "reset_mask" in options:
+            mask = _mask(options["reset_mask"], self.num_envs)
+            options = {key: value for key, value in options.items() if key != "reset_mask"} or None
+        given = self._each("options", options)
+        infos: dict[str, Any] = {}
+        for i in np.flatnonzero(mask).tolist():
+            self._observations[i], info = self.restart(i, seed=seeds[i], options=given[i])
+            infos = self._add_info(infos, info, i)
+        return self._observations.copy(), infos
+
+    def step(
+        self, actions: NDArray[np.float32]
+    ) -> tuple[
+        NDArray[np.float32], NDArray[np.float64], Flags, Flags, dict[str, Any]
+    ]:  # fmt: skip
+        """Steps all tasks, and begins new episodes as ``autoreset_mode`` says.
+
+        Returns:
+            Observations, rewards, terminations, truncations and infos in Gymnasium's form: for
+            each key an array and, as ``_key``, for whom it holds.
+
+        Raises:
+            ValueError: As ``advance``.
+            ResetNeeded: As ``advance``; or, without autoreset, if an episode is over.
+        """
+        mode = self.autoreset_mode
+        if mode is AutoresetMode.DISABLED and self._over.any():
+            over = np.flatnonzero(self._over).tolist()
+            raise ResetNeeded(f"the episodes of the tasks {over} are over; reset them")
+        going = ~self._over
+        outcomes = self.advance(actions, going)
+        rewards = np.zeros(self.num_envs)
+        terminated, truncated = np.zeros((2, self.num_envs), dtype=bool)
+        infos: dict[str, Any] = {}
+        for i, outcome in enumerate(outcomes):
+            if outcome is None:  # its episode was over before this step
+                observation, info = self.restart(i)
+            else:
+                observation, rewards[i], terminated[i], truncated[i], info = outcome
+                if self._over[i] and mode is AutoresetMode.SAME_STEP:
+                    infos = self._add_info(infos, {"final_obs": observation, "final_info": info}, i)
+                    observation, info = self.restart(i)
+            self._observations[i] = observation
+            infos = self._add_info(infos, info, i)
+        return self._observations.copy(), rewards, terminated, truncated, infos
+
+    def _each(self, name: str, values: Any) -> list[Any]:
+        """One value for each task."""
+        if values is None or isinstance(values, Mapping | int | np.integer):
+            return [values] * self.num_envs
+        values = list(values)
+        if len(values) != self.num_envs:
+            raise ValueError(f"{name} must be {self.num_envs}, got {len(values)}")
+        return values
+
+    def render(self) -> tuple[Any, ...]:
+        """The picture of each task, as its ``render``."""
+        return tuple(env.render() for env in self.envs)
+
+    def call(self, name: str, *args: Any, **kwargs: Any) -> tuple[Any, ...]:
+        """Calls a method of each task, or reads an attribute."""
+        found = [env.get_wrapper_attr(name) for env in self.envs]
+        return tuple(value(*args, **kwargs) if callable(value) else value for value in found)
+
+    def get_attr(self, name: str) -> tuple[Any, ...]:
+        """An attribute of each task."""
+        return self.call(name)
+
+    def set_attr(self, name: str, values: Any) -> None:
+        """Sets an attribute of each task: those of a list or tuple, or one value for all.
+
+        Raises:
+            ValueError: If a list or tuple does not have a value for each task.
+        """
+        values = self._each(
+            "values", values if isinstance(values, list | tuple) else [values] * self.num_envs
+        )
+        for env, value in zip(self.envs, values, strict=True):
+            env.set_wrapper_attr(name, value)
+
+    @property  # type: ignore[misc]  # to be read only, as in Gymnasium's own vector environments
+    def np_random(self) -> Any:
+        """The generator of each task."""
+        return self.get_attr("np_random")
+
+    @property
+    def np_random_seed(self) -> Any:
+        """The seed of each task's generator."""
+        return self.get_attr("np_random_seed")
+
+    def close_extras(self, **kwargs: Any) -> None:
+        """Closes the tasks and ends the threads."""
+        self._batch = None
+        for env in self.envs:
+            env.close()
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Everything but the threads: a copy goes on where this one is."""
+        return self.__dict__ | {"_batch": None}
+
+
+def _mask(mask: Any, size: int) -> Flags:
+    if not isinstance(mask, np.ndarray) or mask.dtype != np.bool_:
+        raise TypeError(f"reset_mask must be an array of booleans, got {mask!r}")
+    if mask.shape != (size,) or not mask.any():
+        raise ValueError(f"reset_mask must have shape ({size},) and name a task, got {mask}")
+    return mask
