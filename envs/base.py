@@ -1,5 +1,6 @@
 """What all tasks share: a simulation, how tools reach it, and its picture."""
 
+from abc import ABC, abstractmethod
 from typing import Any, ClassVar
 
 import gymnasium as gym
@@ -17,7 +18,7 @@ Outcome = tuple[Observation, float, bool, bool, dict[str, Any]]
 """What ``step`` returns: observation, reward, terminated, truncated and info."""
 
 
-class SimulatedTask(gym.Env[Observation, Action]):
+class SimulatedTask(gym.Env[Observation, Action], ABC):
     """A task that runs a ``Simulation``; its heirs say what is seen, done and paid for.
 
     A step is ``begin``, which says what the action does to the simulation, then the simulation,
@@ -37,10 +38,11 @@ class SimulatedTask(gym.Env[Observation, Action]):
     _size: tuple[int, int]
     _screen: Offscreen | None = None
 
+    @abstractmethod
     def begin(self, command: NDArray[np.float64]) -> Drive:
         """Translates a command, the action within its bounds, to what drives the simulation."""
-        raise NotImplementedError
 
+    @abstractmethod
     def finish(self, drive: Drive, error: SimulationDiverged | None) -> Outcome:
         """What the control step has led to.
 
@@ -48,7 +50,6 @@ class SimulatedTask(gym.Env[Observation, Action]):
             drive: What ``begin`` returned.
             error: Why the simulation broke off, or None.
         """
-        raise NotImplementedError
 
     def command(self, action: Action) -> NDArray[np.float64]:
         """The action as finite numbers within -1 and 1.
