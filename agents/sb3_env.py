@@ -1,0 +1,120 @@
+"""The vector environment in the form that Stable-Baselines3 learns from."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+from numpy.typing import NDArray
+from stable_baselines3.common.vec_env import VecEnv
+from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices, VecEnvStepReturn
+
+from tca_mj.envs.base import SimulatedTask
+from tca_mj.envs.vector import TaskVector
+
+
+class TaskVecEnv(VecEnv):
+    """Tasks that are stepped together, as a ``VecEnv``.
+
+        env = TaskVecEnv.make("TCA/TetrapodWalk-v0", 8, num_threads=2)
+        model = PPO("MlpPolicy", VecNormalize(VecMonitor(env)))
+
+    It is, bit for bit, ``DummyVecEnv`` over the single tasks: an episode that is over is followed
+    by the next one in the same step, with the last observation as ``terminal_observation`` in its
+    info and ``TimeLimit.truncated`` where it was cut off. ``VecMonitor`` takes the place of
+    ``Monitor``, which wraps single tasks.
+
+    Options of the next reset are set by ``set_options``; those of every reset, also of the ones
+    that follow an episode, are the vector environment's ``reset_options``.
+
+    Attributes:
+        tasks: The vector environment.
+    """
+
+    def __init__(self, tasks: TaskVector) -> None:
+        """Takes a vector environment, whose own autoreset is not used."""
+        self.tasks = tasks
+        self._actions = np.zeros(tasks.action_space.shape or (), dtype=np.float32)
+        super().__init__(tasks.num_envs, tasks.single_observation_space, tasks.single_action_space)
+
+    @classmethod
+    def make(cls, id: str, num_envs: int, **kwargs: Any) -> "TaskVecEnv":
+        """Makes the vector environment, too.
+
+        Args:
+            id: Gymnasium id of a task of this package.
+            num_envs: Number of tasks.
+            **kwargs: Other arguments of ``TaskVector`` and of the task.
+
+        Raises:
+            ValueError: If the id is none of this package's, or as ``TaskVector``.
+        """
+        tasks = gym.make_vec(id, num_envs=num_envs, **kwargs)
+        if not isinstance(tasks, TaskVector):
+            raise ValueError(f"id must be one of this package's tasks, got {id}")
+        return cls(tasks)
+
+    def reset(self) -> NDArray[np.float32]:
+        """Begins new episodes with the seeds and options that were set for this once."""
+        first = []
+        for i, (seed, options) in enumerate(zip(self._seeds, self._options, strict=True)):
+            observation, self.reset_infos[i] = self.tasks.restart(
+                i, seed=seed, options=options or None
+            )
+            first.append(observation)
+        self._reset_seeds()
+        self._reset_options()
+        return np.stack(first)
+
+    def step_async(self, actions: NDArray[np.float32]) -> None:
+        """Keeps the actions for ``step_wait``."""
+        self._actions = actions
+
+    def step_wait(self) -> VecEnvStepReturn:
+        """Steps all tasks, and begins a new episode where one is over; errors as the tasks'."""
+        observations, infos = [], []
+        rewards, dones = np.zeros(self.num_envs, np.float32), np.zeros(self.num_envs, bool)
+        for i, outcome in enumerate(self.tasks.advance(self._actions)):
+            assert outcome is not None  # all are stepped
+            observation, rewards[i], terminated, truncated, info = outcome
+            dones[i] = terminated or truncated
+            info["TimeLimit.truncated"] = truncated and not terminated
+            if dones[i]:
+                info["terminal_observation"] = observation
+                observation, self.reset_infos[i] = self.tasks.restart(i)
+            observations.append(observation)
+            infos.append(info)
+        return np.stack(observations), rewards, dones, infos
+
+    def close(self) -> None:
+        """Closes the tasks."""
+        self.tasks.close()
+
+    def get_images(self) -> Sequence[Any]:
+        """The picture of each task; None without a render mode."""
+        return self.tasks.render()
+
+    def get_attr(self, attr_name: str, indices: VecEnvIndices = None) -> list[Any]:
+        """An attribute of the tasks."""
+        return [env.get_wrapper_attr(attr_name) for env in self._chosen(indices)]
+
+    def set_attr(self, attr_name: str, value: Any, indices: VecEnvIndices = None) -> None:
+        """Sets an attribute of the tasks."""
+        for env in self._chosen(indices):
+            setattr(env, attr_name, value)
+
+    def env_method(
+        self, method_name: str, *method_args: Any, indices: VecEnvIndices = None, **kwargs: Any
+    ) -> list[Any]:
+        """Calls a method of the tasks."""
+        methods = [env.get_wrapper_attr(method_name) for env in self._chosen(indices)]
+        return [method(*method_args, **kwargs) for method in methods]
+
+    def env_is_wrapped(
+        self, wrapper_class: type[gym.Wrapper[Any, Any, Any, Any]], indices: VecEnvIndices = None
+    ) -> list[bool]:
+        """False for each task: they have no wrappers."""
+        return [False for _ in self._chosen(indices)]
+
+    def _chosen(self, indices: VecEnvIndices) -> list[SimulatedTask]:
+        return [self.tasks.envs[i] for i in self._get_indices(indices)]
