@@ -4,7 +4,7 @@ Found by a random search for speed in each task, from what Sun, Section 6.3.2, s
 the search gave the figures, the sequence of the legs is the published one.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 
 import numpy as np
@@ -35,6 +35,9 @@ WALK = Gait(
     warm=(75.0, 92.0, 50.0),
 )
 """An amble: rear left, front left, rear right, front right lift one after the other."""
+
+TROT = replace(WALK, offset=(0.5, 0.0, 0.0, 0.5))
+"""The walk's figures with diagonal legs together: not what was reported, a start for searches."""
 
 SHIMMY = Gait(
     period=14.0,
@@ -91,7 +94,7 @@ class GaitPolicy:
         """
         if gait not in GAITS:
             raise ValueError(f"gait must be one of {list(GAITS)}, got {gait!r}")
-        return cls(GAITS[gait], _STEERING[gait], robot or TetrapodSpec())
+        return cls(GAITS[gait], STEERING[gait], robot or TetrapodSpec())
 
     @property
     def phase(self) -> str:
@@ -134,4 +137,4 @@ class GaitPolicy:
 
 
 # The side that is to be turned to makes shorter strokes. Estimates that hold the direction.
-_STEERING = {"crawl": 600.0, "walk": 600.0, "shimmy": 0.0}
+STEERING = {"crawl": 600.0, "walk": 600.0, "shimmy": 0.0}

@@ -13,6 +13,7 @@ from tca_mj.registry import TASKS
 OBJECTS = ("screwdriver", "pcb")
 DEMOS = ("pick-and-place", "tetrapod")
 POLICIES = ("scripted", "off", "random")
+ALGORITHMS = ("cma",)
 
 _EXAMPLES = """\
 examples:
@@ -22,6 +23,7 @@ examples:
   rerun runs/board/rollout.rrd                  look at what happened
   tca-mj list                                   the tasks
   tca-mj view TCA/ArmPickPlace-v0               watch it in a window
+  tca-mj train TCA/TetrapodWalk-v0 --algo cma   search a faster gait
   tca-mj bench --out runs/bench                 how fast it is on this machine
   tca-mj validate tca --out runs/validation     the models against what is published
   tca-mj certify --out runs/certificate         the chains against the theory of rods
@@ -80,6 +82,30 @@ Writes into the folder --out:
   accuracy_*.png       figures (needs `pip install 'tca-mj[demo]'`)
 
 An error beyond 1 % of the length or 2 degrees is no failure of the command: its exit code is 0.
+"""
+
+_TRAIN = """\
+Trains a policy for a task and writes the run into the folder --out. Ctrl-C and even kill -9 lose
+at most the last interval: the same command again goes on with the run. What is drawn comes from
+--seed alone; with the same seed the curve is the same to the last digit, interrupted or not.
+
+  cma    searches the figures of a tetrapod's gait (CMA-ES), from the scripted one; a gait task
+         takes about an hour on two cores. Episodes run in --workers processes, on whose number
+         nothing depends.
+
+The folder holds
+  run.json        settings, command, versions, machine
+  state.pkl       where the run stands; only go on with runs that you trust
+  curve.csv       the learning curve; tensorboard/ has the same: `tensorboard --logdir FOLDER`
+  best.json       the best policy so far: `tca-mj view TASK --policy FOLDER/best.json`
+  last.json       the policy where the run stands
+
+Needs `pip install 'tca-mj[rl]'`. Exit code: 0 when the run is done, 2 if the command was wrong,
+130 after Ctrl-C.
+
+examples:
+  tca-mj train TCA/TetrapodWalk-v0 --algo cma --seed 0 --out runs/walk
+  tca-mj train TCA/TetrapodWalk-v0 --algo cma --start trot --seeds 3 --out runs/trot
 """
 
 _NO_DISPLAY = """\
@@ -153,6 +179,25 @@ def _parser() -> argparse.ArgumentParser:
     view.add_argument("--seed", type=_seed, default=0, help="seed of the first episode; default 0")
     view.set_defaults(run=_view)
 
+    train = commands.add_parser(
+        "train", help="train a policy", description=_TRAIN, formatter_class=style
+    )
+    train.add_argument("task", choices=[task.id for task in TASKS], metavar="TASK", help="its id")
+    train.add_argument("--algo", choices=ALGORITHMS, required=True, help="how")
+    train.add_argument("--steps", type=_count, help="steps of the task in all; default: by task")
+    some = train.add_mutually_exclusive_group()
+    some.add_argument("--seed", type=_seed, default=0, help="default 0")
+    some.add_argument(
+        "--seeds", type=_count, metavar="K", help="runs with seeds 0 to K-1, into OUT/seed_0, ..."
+    )
+    train.add_argument("--out", type=_folder, help="folder; default runs/train/TASK-ALGO")
+    train.add_argument("--workers", type=_count, default=2, help="processes; default 2")
+    train.add_argument(
+        "--start", default="scripted", metavar="GAIT",
+        help="where a search of gaits begins: scripted (default), trot, or a policy's file or name",
+    )
+    train.set_defaults(run=_train)
+
     bench = commands.add_parser("bench", help="measure the speed on this machine")
     bench.add_argument("--out", type=_folder, help="folder for benchmark.json and benchmark.md")
     bench.add_argument("--quick", action="store_true", help="a tenth of the measurements")
@@ -175,6 +220,12 @@ def _parser() -> argparse.ArgumentParser:
     certify.add_argument("--seed", type=_seed, default=0, help="of the cases; default 0")
     certify.set_defaults(run=_certify)
     return parser
+
+
+def _count(text: str) -> int:
+    if _seed(text) < 1:
+        raise argparse.ArgumentTypeError(f"must be at least 1, got {text}")
+    return int(text)
 
 
 def _seed(text: str) -> int:
@@ -332,6 +383,38 @@ def scripted(task: Any) -> Any:
     if name == "TetrapodGait":
         return GaitPolicy.of(task.gait)
     return MorphPolicy() if name == "MorphModule" else PickAndPlace()
+
+
+def _train(arguments: argparse.Namespace) -> int:
+    import shlex
+
+    try:
+        from tca_mj.agents.search import BEST, SearchConfig, search
+    except ImportError as error:
+        print(f"tca-mj train: {error}; pip install 'tca-mj[rl]'", file=sys.stderr)
+        return 2
+    name = arguments.task.partition("/")[2].partition("-")[0]
+    base = arguments.out or Path("runs/train") / f"{name}-{arguments.algo}"
+    several = range(arguments.seeds) if arguments.seeds else None
+    command = shlex.join(["tca-mj", "train", arguments.task, "--algo", arguments.algo])
+    for option in ("steps", "start", "seed", "seeds"):
+        value = getattr(arguments, option)
+        if value is not None and not (option == "seed" and several):
+            command += f" --{option} {shlex.quote(str(value))}"
+    for seed in several or [arguments.seed]:
+        out = base / f"seed_{seed}" if several else base
+        steps = {"steps": arguments.steps} if arguments.steps else {}
+        try:
+            config = SearchConfig(task=arguments.task, seed=seed, start=arguments.start, **steps)
+            search(config, out, workers=arguments.workers, command=command)
+        except (FileNotFoundError, ValueError) as error:
+            print(f"tca-mj train: {error}", file=sys.stderr)
+            return 2
+        except KeyboardInterrupt:
+            print(f"interrupted; the same command goes on with {out}", file=sys.stderr)
+            return 130
+        print(f"  {out / BEST}")
+    return 0
 
 
 def _bench(arguments: argparse.Namespace) -> int:

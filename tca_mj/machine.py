@@ -9,10 +9,14 @@ from pathlib import Path
 RELEVANT = ("tca-mj", "mujoco", "gymnasium", "numpy", "rerun-sdk")
 
 
-def versions() -> dict[str, str]:
-    """Versions of Python and of the packages that results depend on, by name."""
+def versions(*more: str) -> dict[str, str]:
+    """Versions of Python and of the packages that results depend on, by name.
+
+    Args:
+        more: Distributions on which they depend besides.
+    """
     found = {"python": platform.python_version()}
-    for name in RELEVANT:
+    for name in (*RELEVANT, *more):
         try:
             found[name] = version(name)
         except PackageNotFoundError:

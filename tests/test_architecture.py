@@ -52,6 +52,7 @@ LOWEST = {
     "glfw": "envs",
     "stable_baselines3": "agents",
     "torch": "agents",
+    "cmaes": "agents",
     "tqdm": "agents",
 }
 # Third-party packages that belong to single files or packages instead: where, and nowhere else.

@@ -1,0 +1,167 @@
+"""How good a gait is: headway over whole cycles, and the score by which a search ranks gaits."""
+
+import functools
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+
+from tca_mj.agents.tetrapod_gaits import GaitPolicy
+from tca_mj.control import Gait
+from tca_mj.envs.stance import LEG_TCAS
+from tca_mj.envs.tetrapod import TetrapodGait
+
+# Where penalties begin, somewhat within what is demanded of a gait, and how much they cost. The
+# demands: no more energy per metre than the scripted gait, a drift below 20 %, at most 180 °C and
+# 0.78 N. Weights are estimates: what breaks a demand by a tenth costs as much as a fifth of the
+# speed.
+ENERGY_SHARE, ENERGY_WEIGHT = 0.98, 2.0  # of the energy per metre of the reference
+DRIFT_SHARE, DRIFT_WEIGHT = 0.1, 2.0  # of the distance
+HOTTEST, HEAT_WEIGHT = 176.0, 0.1  # [°C], [1/K]
+TENSION, TENSION_WEIGHT = 0.70, 10.0  # [N], [1/N]
+SLOWEST = 0.2  # share of the reference's speed that the drift is counted against at least
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Trial:
+    """One episode to run.
+
+    Attributes:
+        task: Gymnasium id of one of the tetrapod's gait tasks.
+        gait: The gait.
+        steering: As in ``GaitPolicy``, per leg [K/rad].
+        seed: Seed of the episode.
+        randomise: Spread of the variation, as in the reset of ``TetrapodGait``.
+        settling: Time that is not judged, in which the TCAs become warm; rounded to whole cycles
+            [s].
+        window: Time that is judged, rounded to whole cycles, at least one [s].
+    """
+
+    task: str
+    gait: Gait
+    steering: tuple[float, ...]
+    seed: int
+    randomise: float
+    settling: float
+    window: float
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Headway:
+    """What came of an episode after the time for settling.
+
+    Attributes:
+        speed: Along the commanded direction [m/s].
+        aside: Drift across it, positive to the left [m/s].
+        power: Mean electrical power [W].
+        temperature: Highest of a leg's TCA [°C].
+        tension: Largest of a leg's TCA [N].
+        missed: Share of the episode that was missed because it ended early.
+        steps: Control steps that were run.
+    """
+
+    speed: float
+    aside: float
+    power: float
+    temperature: float
+    tension: float
+    missed: float
+    steps: int
+
+
+def run_trial(trial: Trial) -> Headway:
+    """Runs an episode. What comes out depends on ``trial`` alone."""
+    env, policy = _env(trial.task), GaitPolicy(trial.gait, trial.steering)
+    cycle = trial.gait.period / TetrapodGait.control_period
+    first = round(round(trial.settling / trial.gait.period) * cycle)
+    steps = first + round(max(1, round(trial.window / trial.gait.period)) * cycle)
+    options = {"randomise": trial.randomise, "direction": 0.0}
+    observation, info = env.reset(seed=trial.seed, options=options)
+    begin, hottest, tightest, done = info, 0.0, 0.0, 0
+    for done in range(1, steps + 1):
+        observation, _, terminated, truncated, info = env.step(policy.act(observation))
+        hottest = max(hottest, float(info["temperature"][:LEG_TCAS].max()))
+        tightest = max(tightest, float(info["tension"][:LEG_TCAS].max()))
+        if done == first:
+            begin = info
+        if terminated or truncated:
+            break
+    # An early end leaves less distance for the same time; the power is that of the time walked.
+    judged = (steps - first) * TetrapodGait.control_period
+    walked = max(done - first, 1) * TetrapodGait.control_period
+    moved = done > first
+    return Headway(
+        speed=(info["distance"] - begin["distance"]) / judged if moved else 0.0,
+        aside=(info["drift"] - begin["drift"]) / judged if moved else 0.0,
+        power=float(np.sum(info["energy"] - begin["energy"])) / walked if moved else 0.0,
+        temperature=hottest,
+        tension=tightest,
+        missed=1.0 - done / steps,
+        steps=done,
+    )
+
+
+@functools.cache  # one in each process
+def _env(task: str) -> gym.Env[Any, Any]:
+    return gym.make(task, disable_env_checker=True)
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Reference:
+    """The gait that others are compared with: its mean speed [m/s] and electrical power [W]."""
+
+    speed: float
+    power: float
+
+    def __post_init__(self) -> None:
+        for name in ("speed", "power"):
+            if not 0.0 < getattr(self, name) < np.inf:
+                raise ValueError(f"{name} must be finite and above 0, got {getattr(self, name)}")
+
+    @classmethod
+    def of(cls, trials: Sequence[Headway]) -> "Reference":
+        """That of the episodes of the scripted gait."""
+        return cls(
+            speed=float(np.mean([trial.speed for trial in trials])),
+            power=float(np.mean([trial.power for trial in trials])),
+        )
+
+
+def score(trials: Sequence[Headway], reference: Reference) -> dict[str, float]:
+    """Judges a gait by its episodes.
+
+    Args:
+        trials: At least one.
+        reference: The scripted gait of the task.
+
+    Returns:
+        ``score``, the larger the better: ``speed`` minus ``energy``, ``drift``, ``heat``,
+        ``tension`` and ``fall``, with v the mean speed over the reference's and p the mean power
+        over the reference's:
+        speed: v.
+        energy: 2 max(0, p - 0.98 v); p/v is energy per metre over the reference's.
+        drift: 2 max(0, d - 0.1), d the mean of what is drifted over the distance, which is
+            counted as at least a fifth of the reference's.
+        heat: 0.1 for each kelvin by which the hottest TCA is above 176 °C, mean.
+        tension: 10 for each newton by which the tightest TCA is above 0.70 N, mean.
+        fall: Share of the episodes that ended early, and mean share of the time that they missed.
+    """
+    table = {
+        name: np.array([getattr(trial, name) for trial in trials], dtype=np.float64)
+        for name in ("speed", "aside", "power", "temperature", "tension", "missed")
+    }
+    speed = float(table["speed"].mean()) / reference.speed
+    power = float(table["power"].mean()) / reference.power
+    distance = np.maximum(table["speed"], SLOWEST * reference.speed)
+    drift = float(np.mean(np.abs(table["aside"]) / distance))
+    terms = {
+        "speed": speed,
+        "energy": -ENERGY_WEIGHT * max(0.0, power - ENERGY_SHARE * speed),
+        "drift": -DRIFT_WEIGHT * max(0.0, drift - DRIFT_SHARE),
+        "heat": -HEAT_WEIGHT * float(np.mean(np.maximum(table["temperature"] - HOTTEST, 0.0))),
+        "tension": -TENSION_WEIGHT * float(np.mean(np.maximum(table["tension"] - TENSION, 0.0))),
+        "fall": -float(np.mean((table["missed"] > 0.0) + table["missed"])),
+    }
+    return {"score": sum(terms.values()), **terms}

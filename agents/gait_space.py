@@ -1,0 +1,144 @@
+"""Gaits as points of a unit cube, in which a search may look for better ones."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tca_mj.control import Gait
+from tca_mj.envs.tetrapod import TetrapodGait
+
+Array = NDArray[np.float64]
+
+# Bounds of the search. Estimates, wide about all scripted gaits; the hottest temperature is the
+# one from which on the tasks charge heat, 8 K below the limit of the material.
+PERIOD = (2.0, 20.0)  # [s], on a logarithmic scale
+DUTY = (0.05, 0.95)
+HOT = (60.0, TetrapodGait.hot_temperature)  # [°C]
+COLD = 25.0  # a TCA is kept between here and ``hot`` where it is not hot [°C]
+STEERING = (0.0, 1200.0)  # [K/rad]
+
+_FRONT, _REAR = slice(0, 2), slice(2, 4)  # left and right leg of each pair
+_PAIRS = {"front": _FRONT, "rear": _REAR}
+_TCAS = 3
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class GaitSpace:
+    """Gaits of four legs with three TCAs whose left and right legs share their figures.
+
+    Every number of ``encode`` lies between 0 and 1: the period; the offsets of all legs but the
+    first; for front and rear pair the start of all TCAs but the first, and duty, hot and warm of
+    all; the steering of each pair. Offsets and starts are cyclic and have those of ``centre`` at
+    0.5; what is left out only shifts the others. Warm is a share of the way from 25 °C to hot.
+
+    Attributes:
+        centre: The gait about which offsets and starts are counted.
+
+    Raises:
+        ValueError: If it has not four legs with three TCAs, or is not the same left and right.
+    """
+
+    centre: Gait
+
+    def __post_init__(self) -> None:
+        if self.centre.table("start").shape != (4, _TCAS):
+            raise ValueError(
+                f"centre must have 4 legs with {_TCAS} TCAs, got {self.centre.table('start').shape}"
+            )
+        for name in ("start", "duty", "hot", "warm"):
+            table = self.centre.table(name)
+            if not all((table[pair][0] == table[pair][1]).all() for pair in _PAIRS.values()):
+                raise ValueError(f"{name} must be the same left and right, got {table.tolist()}")
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """What the numbers of a point stand for."""
+        found = ["period", "offset1", "offset2", "offset3"]
+        for pair in _PAIRS:
+            found += [f"{pair}.start{i}" for i in range(1, _TCAS)]
+            found += [f"{pair}.{name}{i}" for name in ("duty", "hot", "warm") for i in range(_TCAS)]
+            found.append(f"{pair}.steering")
+        return tuple(found)
+
+    def fold(self, point: Array) -> Array:
+        """Brings any numbers into the cube: cyclic ones go round, others are reflected."""
+        cyclic = np.array(["offset" in name or ".start" in name for name in self.names])
+        mirrored = 1.0 - np.abs(np.asarray(point) % 2.0 - 1.0)
+        return np.where(cyclic, np.asarray(point) % 1.0, mirrored)
+
+    def encode(self, gait: Gait, steering: tuple[float, ...]) -> Array:
+        """The point of a gait, shape (n,); what is out of bounds goes to the nearest bound.
+
+        Args:
+            gait: A gait of the same left and right.
+            steering: One number per leg, those of a pair the same [K/rad].
+
+        Raises:
+            ValueError: If left and right differ.
+        """
+        GaitSpace(centre=gait)
+        if any(steering[pair][0] != steering[pair][1] for pair in _PAIRS.values()):
+            raise ValueError(f"steering must be the same left and right, got {steering}")
+        offset, start = np.array(gait.offset), gait.table("start")
+        shift = start[:, 0] - self.centre.table("start")[:, 0]
+        offset, start = offset - shift, start - shift[:, None]
+        offset -= offset[0] - self.centre.offset[0]
+        point = [_share(math.log(gait.period), *np.log(PERIOD))]
+        point += list((offset - self.centre.offset + 0.5)[1:] % 1.0)
+        for pair in _PAIRS.values():
+            i = pair.start
+            point += list((start[i] - self.centre.table("start")[i] + 0.5)[1:] % 1.0)
+            hot = gait.table("hot")[i]
+            point += [_share(duty, *DUTY) for duty in gait.table("duty")[i]]
+            point += [_share(value, *HOT) for value in hot]
+            point += list((gait.table("warm")[i] - COLD) / (hot - COLD))
+            point.append(_share(steering[i], *STEERING))
+        return np.clip(point, 0.0, 1.0)
+
+    def decode(self, point: Array) -> tuple[Gait, tuple[float, ...]]:
+        """The gait of a point, and its steering per leg [K/rad].
+
+        Raises:
+            ValueError: If the point has the wrong length or numbers out of 0 to 1.
+        """
+        point = np.asarray(point, dtype=np.float64)
+        if point.shape != (len(self.names),) or not ((point >= 0.0) & (point <= 1.0)).all():
+            raise ValueError(f"point must be {len(self.names)} numbers from 0 to 1, got {point}")
+        numbers = iter(point.tolist())
+
+        def row(n: int = _TCAS) -> Array:
+            return np.array([next(numbers) for _ in range(n)])
+
+        period = math.exp(_between(next(numbers), *np.log(PERIOD)))
+        offset = np.array(self.centre.offset)
+        offset[1:] = (offset[1:] + row(_TCAS) - 0.5) % 1.0
+        tables: dict[str, list[tuple[float, ...]]] = {
+            name: [] for name in ("start", "duty", "hot", "warm")
+        }
+        steering: list[float] = []
+        for pair in _PAIRS.values():
+            start = self.centre.table("start")[pair.start]
+            start[1:] = (start[1:] + row(_TCAS - 1) - 0.5) % 1.0
+            duty = _between(row(), *DUTY)
+            hot = _between(row(), *HOT)
+            warm = np.minimum(COLD + row() * (hot - COLD), hot)
+            rows = {"start": start, "duty": duty, "hot": hot, "warm": warm}
+            for name, value in rows.items():
+                tables[name] += [tuple(np.asarray(value).tolist())] * 2
+            steering += [float(_between(next(numbers), *STEERING))] * 2
+        gait = Gait(
+            period=period,
+            offset=tuple(offset.tolist()),
+            **{name: tuple(rows) for name, rows in tables.items()},
+        )
+        return gait, tuple(steering)
+
+
+def _share(value: float, low: float, high: float) -> float:
+    return (value - low) / (high - low)
+
+
+def _between(share: float | Array, low: float, high: float) -> float | Array:
+    return np.minimum(low + share * (high - low), high)
