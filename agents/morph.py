@@ -62,6 +62,11 @@ class MorphPolicy:
         """Angle [rad] that a resistance [ohm] tells."""
         return float(self._fit.displacement(resistance))
 
+    @property
+    def phase(self) -> str:
+        """Name of the present phase."""
+        return "" if self.progress is None else self.progress.phase.value
+
     def reset(self) -> None:
         """Starts anew."""
         self.progress = None

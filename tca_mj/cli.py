@@ -374,6 +374,7 @@ def scripted(task: Any) -> Any:
     """The scripted policy of a task, with ``act`` and ``reset``."""
     from tca_mj.agents.course import CourseWalker
     from tca_mj.agents.morph import MorphPolicy
+    from tca_mj.agents.reach import ReachPolicy
     from tca_mj.agents.scripted import PickAndPlace
     from tca_mj.agents.tetrapod_gaits import GaitPolicy
 
@@ -382,7 +383,8 @@ def scripted(task: Any) -> Any:
         return CourseWalker(task)
     if name == "TetrapodGait":
         return GaitPolicy.of(task.gait)
-    return MorphPolicy() if name == "MorphModule" else PickAndPlace()
+    others: dict[str, Any] = {"BendReach": ReachPolicy, "MorphModule": MorphPolicy}
+    return others.get(name, PickAndPlace)()
 
 
 def _train(arguments: argparse.Namespace) -> int:

@@ -45,6 +45,11 @@ TASKS = (
         entry_point="tca_mj.envs.morph:MorphModule",
         max_episode_steps=800,
     ),
+    Task(
+        id="TCA/BendReach-v0",
+        entry_point="tca_mj.envs.reach:BendReach",
+        max_episode_steps=200,
+    ),
     *(
         Task(
             id=f"TCA/Tetrapod{gait.capitalize()}-v0",

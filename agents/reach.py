@@ -1,0 +1,72 @@
+"""The scripted policy of ``TCA/BendReach-v0``: the inverse of the statics, and feedback on it."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tca_mj.control import Thermostat
+from tca_mj.envs.hanging import StaticTip
+from tca_mj.envs.reach import ACTION, OBSERVATION, BendReach
+from tca_mj.modules.bending import BendingSpec
+
+
+@dataclass(slots=True)
+class ReachPolicy:
+    """Temperatures from a model at rest, corrected by where the tip is: observation in, action out.
+
+    Its own, nominal module tells at which temperatures the tip would rest at the target, and how
+    the tip's place changes with them. By how much the tip misses the target is integrated and,
+    through that slope, taken off.
+
+    Attributes:
+        module_spec: The module it was told that it has.
+        averaging: Time over which what is missed is integrated to as much again [s].
+        near: How near the temperatures have to be to those aimed at for that: on the way there the
+            tip misses the target for no fault of the model [K].
+        hottest: Temperature that no TCA is asked to pass [°C]. By 5 K below that from which on the
+            module may roll over, so that one that is weaker than nominal reaches its targets.
+    """
+
+    module_spec: BendingSpec = field(default_factory=BendingSpec)
+    averaging: float = 1.0
+    near: float = 10.0
+    hottest: float = BendReach.hot_temperature - 5.0
+    _static: StaticTip = field(init=False)
+    _thermostat: Thermostat = field(init=False)
+    _target: NDArray[np.float64] | None = None
+    _rest: NDArray[np.float64] = field(default_factory=lambda: np.zeros(3))
+    _slope: NDArray[np.float64] = field(default_factory=lambda: np.eye(3))
+    _off: NDArray[np.float64] = field(default_factory=lambda: np.zeros(3))
+
+    def __post_init__(self) -> None:
+        self._static = StaticTip(self.module_spec)
+        heat = self._static.sim.bank.heat
+        self._thermostat = Thermostat(heat=heat, max_power=BendReach.max_power)
+
+    @property
+    def phase(self) -> str:
+        """What it does: always the same."""
+        return "reach"
+
+    def reset(self) -> None:
+        """Starts anew."""
+        self._target = None
+        self._off = np.zeros(3)
+
+    def act(self, observation: NDArray[np.float32]) -> NDArray[np.float32]:
+        """The action for the next control period, shape (3,)."""
+        rows = OBSERVATION.read(observation.astype(np.float64))
+        target, temperature = rows["target position"], rows["TCA temperature"]
+        if self._target is None or (target != self._target).any():
+            self._target = target
+            self._rest, self._slope, _ = self._static.inverse(target, BendReach.hottest_target)
+        ambient = self._static.sim.bank.heat.ambient
+        aim = self._rest - np.linalg.solve(self._slope, self._off)
+        aim = np.clip(aim, ambient, self.hottest)
+        if np.abs(temperature - aim).max() < self.near:
+            missed = rows["tip position"] - target
+            self._off += BendReach.control_period / self.averaging * missed
+        power = self._thermostat.power(temperature, aim)
+        action = 2.0 * power / BendReach.max_power - 1.0
+        return np.clip(action, -1.0, 1.0).astype(ACTION.space.dtype)

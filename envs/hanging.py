@@ -1,0 +1,139 @@
+"""A bending module that hangs from a stand, and where its tip rests."""
+
+from dataclasses import replace
+
+import mujoco
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from tca_mj.assets import mjcf
+from tca_mj.model.part import Part, new_spec
+from tca_mj.model.scene import scene
+from tca_mj.modules.bending import BendingSpec, bending_module
+from tca_mj.sim import Simulation
+
+TCAS = 3
+PERIOD = 0.1  # time between two updates of the TCAs [s]
+
+CLAMP = np.array([0.0, 0.0, 0.1])  # where the module hangs [m]
+_DOWN = (0.0, 1.0, 0.0, 0.0)  # z of the module down, its TCA 0 towards x of the world, wxyz
+_RESTING = 4.0  # time after which a module at constant temperatures rests, see the docs [s]
+_AT_REST = 5e-5  # way of the tip in the last control period of that, if it does [m]
+_FOUND = 2e-5  # how near the search for temperatures comes, if it can [m]
+_PROBE, _STRIDE = 1.0, 30.0  # changes of temperature to find a slope, and of one round of it [K]
+
+
+class NoRest(ArithmeticError):
+    """The module does not come to rest."""
+
+
+class StaticTip:
+    """Where the tip of a hanging module rests, found by letting it come to rest.
+
+    Attributes:
+        sim: The module in its scene; what is asked for changes its state.
+    """
+
+    def __init__(self, spec: BendingSpec, *, timestep: float = 5e-3) -> None:
+        """Builds the scene.
+
+        Args:
+            spec: The module, with three TCAs.
+            timestep: Physics time step, of which ``PERIOD`` is a multiple [s].
+
+        Raises:
+            ValueError: If the module has not three TCAs or cannot be built, or the time step fits
+                ``PERIOD`` not.
+        """
+        if spec.count != TCAS:
+            raise ValueError(f"module_spec must have {TCAS} TCAs, got {spec.count}")
+        self.sim = Simulation(hanging_module(spec), timestep=timestep, tca_period=PERIOD)
+        self._tip = int(self.sim.model.site("bench.module.tip").id)
+
+    def locate(self) -> None:
+        """Computes where the tip is now: a physics step leaves where it was at its start."""
+        model, data = self.sim.model, self.sim.data
+        mujoco.mj_kinematics(model, data)
+        mujoco.mj_comPos(model, data)
+        mujoco.mj_comVel(model, data)
+
+    def tip(self) -> NDArray[np.float64]:
+        """Where the tip was when it was last located, from the clamp, shape (3,) [m]."""
+        return self.sim.data.site_xpos[self._tip] - CLAMP
+
+    def velocity(self) -> NDArray[np.float64]:
+        """Velocity that the tip had then, shape (3,) [m/s]."""
+        six, site = np.empty(6), mujoco.mjtObj.mjOBJ_SITE
+        mujoco.mj_objectVelocity(self.sim.model, self.sim.data, site, self._tip, six, 0)
+        return six[3:]
+
+    def at(self, temperature: ArrayLike) -> NDArray[np.float64]:
+        """Where the tip rests at constant temperatures of the TCAs.
+
+        The unloaded module gets the temperatures at once and is then left alone for 4 s, with the
+        power that its heat loss takes.
+
+        Args:
+            temperature: Temperatures, shape (3,), at least that of the surroundings [°C].
+
+        Raises:
+            NoRest: If the tip still moves then.
+            SimulationDiverged: If the module leaves what the TCAs' law holds for.
+        """
+        sim, heat = self.sim, self.sim.bank.heat
+        temperature = np.array(temperature, dtype=np.float64)
+        sim.reset()
+        sim.tca = replace(sim.tca, temperature=temperature)
+        power = heat.loss * (temperature - heat.ambient)
+        sim.step(power, _RESTING - PERIOD)
+        before = self.tip()
+        sim.step(power, PERIOD)
+        moved = float(np.linalg.norm(self.tip() - before))
+        if moved > _AT_REST:
+            raise NoRest(f"the tip moves {moved:.2g} m in {PERIOD} s at {temperature} °C")
+        return self.tip()
+
+    def inverse(
+        self, target: ArrayLike, hottest: float
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
+        """Temperatures at which the tip rests as near to ``target`` as it can.
+
+        Args:
+            target: A place, from the clamp, shape (3,) [m].
+            hottest: Temperature that no TCA may pass [°C].
+
+        Returns:
+            The temperatures, shape (3,) [°C]; the derivative of the tip's place by them, shape
+            (3, 3) [m/K]; and how far the tip is from the target [m].
+
+        Raises:
+            NoRest, SimulationDiverged: As ``at``.
+        """
+        target, ambient = np.asarray(target, dtype=np.float64), self.sim.bank.heat.ambient
+        # The TCA on the target's side is the hottest.
+        angle = -2.0 * np.pi / TCAS * np.arange(TCAS)
+        aside = np.cos(angle) * target[0] + np.sin(angle) * target[1]
+        share = np.clip(0.4 + aside / 0.04, 0.1, 0.9)
+        found, before = ambient + share * (hottest - ambient), np.inf
+        while True:
+            tip = self.at(found)
+            gap = float(np.linalg.norm(tip - target))
+            moved = np.where(found + _PROBE > hottest, -_PROBE, _PROBE)
+            slope = np.stack(
+                [(self.at(found + way) - tip) / way.sum() for way in np.diag(moved)], axis=-1
+            )
+            if gap < _FOUND or gap > 0.9 * before:
+                return found, slope, gap
+            before = gap
+            change = np.linalg.lstsq(slope, target - tip, rcond=None)[0]
+            change /= max(1.0, np.abs(change).max() / _STRIDE)
+            found = np.clip(found + change, ambient, hottest)
+
+
+def hanging_module(spec: BendingSpec) -> Part:
+    """The scene: the module, named ``module``, hangs from a stand; with the target's mark."""
+    mjspec = new_spec("reach")
+    mjspec.worldbody.add_site(name="clamp", pos=list(CLAMP), quat=list(_DOWN), group=4)
+    robot = Part(mjspec)
+    robot.attach(bending_module(spec), to="clamp", prefix="module")
+    return scene(mjcf("arena.xml"), robot, {"stand": mjcf("reach_stand.xml")}, name="bench")

@@ -1,0 +1,291 @@
+"""``TCA/BendReach-v0``: three TCAs bring the tip of a soft module to a point (Sun, 4.1.3)."""
+
+from collections.abc import Mapping
+from dataclasses import asdict
+from typing import Any, ClassVar
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from tca_mj.envs.base import Observation, Outcome, SimulatedTask
+from tca_mj.envs.hanging import CLAMP, PERIOD, TCAS, NoRest, StaticTip
+from tca_mj.envs.table import Entry, Table, numbers
+from tca_mj.modules.bending import BendingSpec
+from tca_mj.sim import Drive, SimulationDiverged
+from tca_mj.variation import Nominal, Variation
+
+CAMERAS = ("front", "side")
+
+OBSERVATION = Table(
+    [
+        Entry("TCA temperature", TCAS, -50.0, 300.0, "°C"),
+        Entry("TCA length", TCAS, 0.0, 0.15, "m"),
+        Entry("TCA tension", TCAS, 0.0, 5.0, "N"),
+        Entry("tip position", 3, -0.1, 0.1, "m"),
+        Entry("tip velocity", 3, -10.0, 10.0, "m/s"),
+        Entry("target position", 3, -0.1, 0.1, "m"),
+        Entry("time at the target", 1, 0.0, 1.0, "s"),
+    ]
+)
+ACTION = Table([Entry("TCA power", TCAS, -1.0, 1.0, "-")])
+
+_SETTLING = 0.5  # time in which the cold module comes to rest [s]
+_SHRINK = 0.8  # rise of temperature is cut to this share until the module comes to rest
+_NEAR = 1e-4  # how near to a given target the module has to rest [m]
+_SUPPLY = 0.9  # share of the largest power that is enough to stay at a target
+_COLDER, _COLDEST = 1.0, 0.75  # largest rise of the other two TCAs over that of the hottest
+
+
+class BendReach(SimulatedTask):
+    """Bring the tip of a hanging bending module to a point, and keep it there.
+
+    Action, shape (3,), all in [-1, 1]: power of the TCAs ``tca0`` to ``tca2``, which bend the
+    module to x and to 120° and 240° from there, clockwise seen from above; -1 is off, 1 is
+    ``max_power``, linear in between.
+
+    Observation, shape (19,): see ``OBSERVATION``, whose rows have units and bounds. Positions are
+    from the clamp, with the axes of the world: z up, so that the cold tip is at z = -45 mm.
+
+    Reward, the sum of the terms in ``info["reward_terms"]``:
+        reach: What the distance between tip and target has shrunk by, over 3 mm.
+        goal: 10 in the step in which the tip has been within 3 mm of the target for 1 s.
+        energy: Minus 0.02 per joule of electrical energy.
+        heat: Minus 0.002 for every kelvin by which a TCA is above ``hot_temperature``.
+        end: Minus 5 in the step in which a TCA is too hot or torn.
+
+    The first is a difference: staying somewhere and shaking earn nothing.
+
+    Reset: cold and at rest. The target is where the tip of this very module rests while its TCAs
+    have temperatures that are drawn between that of the surroundings and ``hottest_target``, or
+    what 90 % of the power can keep: it can be reached, and kept. Options:
+        target: The target, from the clamp, shape (3,) [m]. Refused if the module cannot rest there.
+        friction, mass, tca_gain, heat_loss, ambient: The fields of ``tca_mj.variation.Variation``.
+            Nothing touches the module: friction changes nothing.
+        randomise: Spread with which those of them are drawn that are not given; 0.2 is 20 % and
+            5 K. By default 0.
+
+    Terminates at the goal (success). Truncates after the time limit, and with
+    ``info["truncation_reason"]`` if a TCA is too hot or torn, or if the simulation diverged.
+    """
+
+    max_power: ClassVar[float] = 2.0  # of each TCA, as in the arm [W]
+    max_temperature: ClassVar[float] = 180.0  # annealing temperature, Sun, Table 2.1 [°C]
+    hot_temperature: ClassVar[float] = 140.0  # from about here on the module may roll over [°C]
+    hottest_target: ClassVar[float] = 130.0  # of a TCA, at rest at the target [°C]
+    control_period: ClassVar[float] = PERIOD  # [s]
+    tolerance: ClassVar[float] = 3e-3  # [m]
+    hold_time: ClassVar[float] = 1.0  # time at the target [s]
+
+    def __init__(
+        self,
+        *,
+        render_mode: str | None = None,
+        module_spec: BendingSpec | None = None,
+        timestep: float = 5e-3,
+        camera: str = "front",
+        size: tuple[int, int] = (960, 720),
+    ) -> None:
+        """Builds the scene.
+
+        Args:
+            render_mode: None or ``"rgb_array"``.
+            module_spec: The module, by default the published one; with three TCAs.
+            timestep: Physics time step, of which ``control_period`` is a multiple [s].
+            camera: Camera of the pictures: ``front`` or ``side``.
+            size: Width and height of the pictures [pixels].
+
+        Raises:
+            ValueError: If an argument is unknown or out of range, or the module cannot be built.
+        """
+        for name, value, known in (
+            ("render_mode", render_mode, [None, *self.metadata["render_modes"]]),
+            ("camera", camera, list(CAMERAS)),
+        ):
+            if value not in known:
+                raise ValueError(f"{name} must be one of {known}, got {value!r}")
+        if numbers("size", size, (2,)).min() < 1.0:
+            raise ValueError(f"size must be at least 1 pixel each way, got {size}")
+        self.render_mode: str | None = render_mode
+        self.module_spec = module_spec or BendingSpec()
+        self.static = StaticTip(self.module_spec, timestep=timestep)
+        self.sim = self.static.sim
+        self.observation_space = OBSERVATION.space
+        self.action_space = ACTION.space
+        self._nominal = Nominal(self.sim)
+        self._camera, self._size = f"stand.{camera}", size
+        self._mocap = int(self.model.body("stand.target").mocapid[0])
+        self.target = np.zeros(3)
+        self.target_temperature = self.sim.temperature.copy()
+        self._at_target = 0
+        self._distance = self._gap()
+
+    @property
+    def variation(self) -> Variation:
+        """How far the module of this episode is off."""
+        return self._nominal.variation
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Observation, dict[str, Any]]:
+        """Starts an episode; see the class for the options.
+
+        Raises:
+            ValueError: If an option is unknown or out of its range.
+        """
+        super().reset(seed=seed)
+        setup = self._setup(options or {})
+        self._nominal.apply(setup["variation"])
+        if setup["target"] is None:
+            self.target, self.target_temperature = self._drawn_target(setup["rise"])
+        else:
+            self.target = setup["target"]
+            self.target_temperature = self._given_target(self.target)
+        self.sim.reset()
+        self.sim.step(np.zeros(TCAS), _SETTLING)
+        self.sim.tca = self.sim.bank.rest()
+        self.data.time = 0.0
+        self.data.mocap_pos[self._mocap] = CLAMP + self.target
+        mujoco.mj_forward(self.model, self.data)
+        self._at_target = 0
+        self._distance = self._gap()
+        return self._observe(), self._info()
+
+    def _setup(self, options: Mapping[str, Any]) -> dict[str, Any]:
+        """Draws what the options leave open. All draws are made, so that options shift none."""
+        random = self.np_random
+        rise = random.uniform(0.5, 1.0) * np.array(
+            [1.0, random.uniform(0.0, _COLDER), random.uniform(0.0, _COLDEST)]
+        )
+        rise = rise[random.permutation(TCAS)]
+        draws = random.uniform(-1.0, 1.0, len(Variation.names()))
+        known = ["target", "randomise", *Variation.names()]
+        unknown = [key for key in options if key not in known]
+        if unknown:
+            raise ValueError(f"options must be some of {sorted(known)}, got {unknown}")
+        given = {key: numbers(key, value, (3,) if key == "target" else ())
+                 for key, value in options.items()}  # fmt: skip
+        target = given.pop("target", None)
+        spread = float(given.pop("randomise", 0.0))
+        if not 0.0 <= spread <= 0.5:
+            raise ValueError(f"randomise must be between 0 and 0.5, got {spread}")
+        varied = asdict(Variation.drawn(draws.tolist(), spread))
+        told = {key: float(value) for key, value in given.items()}
+        return {"rise": rise, "target": target, "variation": Variation(**(varied | told))}
+
+    def _drawn_target(
+        self, rise: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Where the tip rests at shares of the largest rise of temperature; and the temperatures.
+
+        A module so far off that it finds no rest there is heated less.
+        """
+        ambient, hottest = self.sim.bank.heat.ambient, self._hottest()
+        while True:
+            temperature = ambient + rise * (hottest - ambient)
+            try:
+                return self.static.at(temperature), temperature
+            except (NoRest, SimulationDiverged):
+                rise = _SHRINK * rise
+
+    def _given_target(self, target: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Temperatures at which the tip rests at a given target."""
+        hottest = self._hottest()
+        temperature, _, gap = self.static.inverse(target, hottest)
+        if gap > _NEAR:
+            raise ValueError(
+                f"target must be where the tip can rest with TCAs of up to {hottest:.0f} °C, got"
+                f" {target}, {1e3 * gap:.1f} mm from there"
+            )
+        return temperature
+
+    def _hottest(self) -> float:
+        """Highest temperature at a target: ``hottest_target``, or what the power can keep."""
+        heat = self.sim.bank.heat
+        kept = heat.ambient + _SUPPLY * self.max_power / heat.loss
+        return min(self.hottest_target, float(np.min(kept)))
+
+    def begin(self, command: NDArray[np.float64]) -> Drive:
+        """Power of the TCAs; see the class."""
+        return Drive(power=self.max_power * (command + 1.0) / 2.0)
+
+    def finish(self, drive: Drive, error: SimulationDiverged | None) -> Outcome:
+        """What the control step has led to; see ``SimulatedTask``."""
+        reason = None if error is None else f"diverged: {error}"
+        self.static.locate()
+        observation = self._observe()
+        outside = OBSERVATION.outside(observation)
+        if outside:
+            reason = reason or f"diverged: {', '.join(outside)} out of bounds"
+        before = self._distance
+        if reason is None:  # nothing is known of a diverged state
+            self._distance = self._gap()
+        near = reason is None and self._distance <= self.tolerance
+        self._at_target = self._at_target + 1 if near else 0
+        excess = np.maximum(self.sim.temperature - self.hot_temperature, 0.0)
+        heat = float(np.sum(excess)) if reason is None else 0.0
+        damage = None if reason else self._damage()
+        reason = reason or damage
+        success = self._held > self.hold_time - 1e-9 and reason is None
+        observation[OBSERVATION.slices["time at the target"]] = min(self._held, self.hold_time)
+        observation = OBSERVATION.bounded(observation) if outside else observation
+        terms = {
+            "reach": (before - self._distance) / self.tolerance,
+            "goal": 10.0 if success else 0.0,
+            "energy": -0.02 * float(np.sum(drive.power)) * self.control_period,
+            "heat": -0.002 * heat,
+            "end": -5.0 if damage else 0.0,
+        }
+        info = {"reward_terms": terms, "success": success, **self._info()}
+        if reason is not None:
+            info["truncation_reason"] = reason
+        return observation, float(sum(terms.values())), success, reason is not None, info
+
+    @property
+    def _held(self) -> float:
+        """Time at the target [s]."""
+        return self._at_target * self.control_period
+
+    def _gap(self) -> float:
+        """Distance of tip and target [m]."""
+        return float(np.linalg.norm(self.static.tip() - self.target))
+
+    def _damage(self) -> str | None:
+        """Why a TCA does not survive, or None."""
+        sim = self.sim
+        hot = sim.temperature > self.max_temperature
+        if hot.any():
+            name = sim.tca_names[int(np.argmax(hot))]
+            return f"overheated: {name} above {self.max_temperature} °C"
+        torn = sim.tension > sim.bank.breaking_force
+        if torn.any():
+            i = int(np.argmax(torn))
+            return f"torn: {sim.tca_names[i]} above {sim.bank.breaking_force[i]} N"
+        return None
+
+    def _observe(self) -> Observation:
+        sim = self.sim
+        return OBSERVATION.pack(
+            {
+                "TCA temperature": sim.temperature,
+                "TCA length": sim.length,
+                "TCA tension": sim.tension,
+                "tip position": self.static.tip(),
+                "tip velocity": self.static.velocity(),
+                "target position": self.target,
+                "time at the target": min(self._held, self.hold_time),
+            }
+        )
+
+    def _info(self) -> dict[str, Any]:
+        sim = self.sim
+        return {
+            "target": self.target.copy(),
+            "target_temperature": self.target_temperature.copy(),
+            "distance_to_target": self._distance,
+            "time": sim.time,
+            "energy": sim.energy.copy(),
+            "temperature": sim.temperature.copy(),
+            "tension": sim.tension.copy(),
+            "variation": asdict(self.variation),
+        }
