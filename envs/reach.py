@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import asdict
+from functools import partial
 from typing import Any, ClassVar
 
 import mujoco
@@ -11,6 +12,7 @@ from numpy.typing import NDArray
 from tca_mj.envs.base import Observation, Outcome, SimulatedTask
 from tca_mj.envs.hanging import CLAMP, PERIOD, TCAS, NoRest, StaticTip
 from tca_mj.envs.table import Entry, Table, numbers
+from tca_mj.envs.vector import TaskVector
 from tca_mj.modules.bending import BendingSpec
 from tca_mj.sim import Drive, SimulationDiverged
 from tca_mj.variation import Nominal, Variation
@@ -289,3 +291,7 @@ class BendReach(SimulatedTask):
             "tension": sim.tension.copy(),
             "variation": asdict(self.variation),
         }
+
+
+BendReachVector = partial(TaskVector, BendReach)
+"""Several of them as one vector environment, made by ``gymnasium.make_vec``."""
