@@ -59,12 +59,12 @@ class SearchConfig:
     """
 
     task: str = "TCA/TetrapodWalk-v0"
-    steps: int = 800_000
+    steps: int = 150_000
     seed: int = 0
     start: str = "scripted"
     sigma: float = 0.03
     population: int = 14
-    episodes: int = 2
+    episodes: int = 1
     randomise: float = 0.2
     settling: float = 10.0
     window: float = 20.0

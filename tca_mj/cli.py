@@ -90,7 +90,7 @@ at most the last interval: the same command again goes on with the run. What is 
 --seed alone; with the same seed the curve is the same to the last digit, interrupted or not.
 
   cma    searches the figures of a tetrapod's gait (CMA-ES), from the scripted one; a gait task
-         takes about an hour on two cores. Episodes run in --workers processes, on whose number
+         takes about 20 minutes on two cores. Episodes run in --workers processes, on whose number
          nothing depends.
 
 The folder holds
