@@ -111,20 +111,24 @@ class SearchState:
     rows: tuple[dict[str, float | int], ...] = ()
 
 
-def first_gait(config: SearchConfig) -> tuple[Gait, tuple[float, ...]]:
-    """The gait where a search begins, and its steering per leg [K/rad].
+def first_gait(task: str, start: str) -> tuple[Gait, tuple[float, ...]]:
+    """The gait from which something starts, and its steering per leg [K/rad].
+
+    Args:
+        task: One of ``TASKS``.
+        start: ``scripted``, ``trot``, or a policy's file or name.
 
     Raises:
-        FileNotFoundError: If ``config.start`` is no policy.
+        FileNotFoundError: If ``start`` is no policy.
         ValueError: If it is a policy without a gait.
     """
-    name = TASKS[config.task]
-    if config.start in ("scripted", "trot"):
-        gait = GAITS[name] if config.start == "scripted" else TROT
+    name = TASKS[task]
+    if start in ("scripted", "trot"):
+        gait = GAITS[name] if start == "scripted" else TROT
         return gait, (STEERING[name],) * gait.legs
-    saved = SavedPolicy.read(find(config.start))
+    saved = SavedPolicy.read(find(start))
     if saved.gait is None:
-        raise ValueError(f"start must have a gait, {config.start} is a {saved.kind}")
+        raise ValueError(f"start must have a gait, {start} is a {saved.kind}")
     return saved.gait, saved.steering
 
 
@@ -152,7 +156,7 @@ def search(
         KeyboardInterrupt: As it came, after everything was written.
     """
     require_count(workers=workers)
-    gait, steering = first_gait(config)
+    gait, steering = first_gait(config.task, config.start)
     space = GaitSpace(centre=gait)
     point = space.encode(gait, steering)
     folder = RunFolder(out, config, command)

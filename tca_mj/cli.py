@@ -13,7 +13,7 @@ from tca_mj.registry import TASKS
 OBJECTS = ("screwdriver", "pcb")
 DEMOS = ("pick-and-place", "tetrapod")
 POLICIES = ("scripted", "off", "random")
-ALGORITHMS = ("cma",)
+ALGORITHMS = ("cma", "ppo", "sac", "td3")
 
 _EXAMPLES = """\
 examples:
@@ -92,13 +92,19 @@ at most the last interval: the same command again goes on with the run. What is 
   cma    searches the figures of a tetrapod's gait (CMA-ES), from the scripted one; a gait task
          takes about 20 minutes on two cores. Episodes run in --workers processes, on whose number
          nothing depends.
+  ppo, sac, td3
+         deep reinforcement learning by Stable-Baselines3, for every task. The defaults of each
+         task are in tca_mj.agents.config. With --residual K the policy of a gait task corrects the
+         temperatures of the gait --start by at most K kelvin.
 
 The folder holds
   run.json        settings, command, versions, machine
   state.pkl       where the run stands; only go on with runs that you trust
   curve.csv       the learning curve; tensorboard/ has the same: `tensorboard --logdir FOLDER`
-  best.json       the best policy so far: `tca-mj view TASK --policy FOLDER/best.json`
-  last.json       the policy where the run stands
+  best.json, best.npz   the best policy so far (a gait, a network):
+                  `tca-mj view TASK --policy FOLDER/best.npz`
+  last.json, last.npz   the policy where the run stands
+  evaluations.csv, best.rrd, best.mp4   evaluations of a network and an episode of the best
 
 Needs `pip install 'tca-mj[rl]'`. Exit code: 0 when the run is done, 2 if the command was wrong,
 130 after Ctrl-C.
@@ -106,6 +112,7 @@ Needs `pip install 'tca-mj[rl]'`. Exit code: 0 when the run is done, 2 if the co
 examples:
   tca-mj train TCA/TetrapodWalk-v0 --algo cma --seed 0 --out runs/walk
   tca-mj train TCA/TetrapodWalk-v0 --algo cma --start trot --seeds 3 --out runs/trot
+  tca-mj train TCA/TetrapodWalk-v0 --algo ppo --residual 20 --steps 300000 --out runs/corrected
 """
 
 _NO_DISPLAY = """\
@@ -191,10 +198,18 @@ def _parser() -> argparse.ArgumentParser:
         "--seeds", type=_count, metavar="K", help="runs with seeds 0 to K-1, into OUT/seed_0, ..."
     )
     train.add_argument("--out", type=_folder, help="folder; default runs/train/TASK-ALGO")
-    train.add_argument("--workers", type=_count, default=2, help="processes; default 2")
+    train.add_argument("--workers", type=_count, default=2, help="processes of cma; default 2")
+    train.add_argument("--envs", type=_count, help="environments of ppo, sac, td3 at a time")
+    train.add_argument(
+        "--residual", type=float, metavar="K", help="correct a gait by at most K kelvin"
+    )
+    train.add_argument(
+        "--video", action=argparse.BooleanOptionalAction, default=True,
+        help="film the best network at the end",
+    )
     train.add_argument(
         "--start", default="scripted", metavar="GAIT",
-        help="where a search of gaits begins: scripted (default), trot, or a policy's file or name",
+        help="gait to begin with or to correct: scripted (default), trot, a policy's file or name",
     )
     train.set_defaults(run=_train)
 
@@ -388,35 +403,50 @@ def scripted(task: Any) -> Any:
 
 
 def _train(arguments: argparse.Namespace) -> int:
-    import shlex
-
     try:
-        from tca_mj.agents.search import BEST, SearchConfig, search
+        import tca_mj.agents.search as searching
+        import tca_mj.agents.train as training
+        from tca_mj.agents.config import default_config
     except ImportError as error:
         print(f"tca-mj train: {error}; pip install 'tca-mj[rl]'", file=sys.stderr)
         return 2
     name = arguments.task.partition("/")[2].partition("-")[0]
     base = arguments.out or Path("runs/train") / f"{name}-{arguments.algo}"
     several = range(arguments.seeds) if arguments.seeds else None
-    command = shlex.join(["tca-mj", "train", arguments.task, "--algo", arguments.algo])
-    for option in ("steps", "start", "seed", "seeds"):
-        value = getattr(arguments, option)
-        if value is not None and not (option == "seed" and several):
-            command += f" --{option} {shlex.quote(str(value))}"
+    command, cma = _command(arguments), arguments.algo == "cma"
     for seed in several or [arguments.seed]:
         out = base / f"seed_{seed}" if several else base
-        steps = {"steps": arguments.steps} if arguments.steps else {}
+        given: dict[str, Any] = {"seed": seed, "start": arguments.start}
+        for option in ("steps",) if cma else ("steps", "envs", "residual"):
+            if getattr(arguments, option) is not None:
+                given[option] = getattr(arguments, option)
         try:
-            config = SearchConfig(task=arguments.task, seed=seed, start=arguments.start, **steps)
-            search(config, out, workers=arguments.workers, command=command)
+            if cma:
+                config = searching.SearchConfig(task=arguments.task, **given)
+                searching.search(config, out, workers=arguments.workers, command=command)
+            else:
+                settings = default_config(arguments.task, arguments.algo, **given)
+                training.train(settings, out, command=command, video=arguments.video)
         except (FileNotFoundError, ValueError) as error:
             print(f"tca-mj train: {error}", file=sys.stderr)
             return 2
         except KeyboardInterrupt:
             print(f"interrupted; the same command goes on with {out}", file=sys.stderr)
             return 130
-        print(f"  {out / BEST}")
+        print(f"  {out / ('best.json' if cma else 'best.npz')}")
     return 0
+
+
+def _command(arguments: argparse.Namespace) -> str:
+    """The command of a training run, to be noted."""
+    import shlex
+
+    words = ["tca-mj", "train", arguments.task, "--algo", arguments.algo]
+    for option in ("steps", "envs", "residual", "start", "seeds", "seed"):
+        value = getattr(arguments, option)
+        if value is not None and not (option == "seed" and arguments.seeds):
+            words += [f"--{option}", f"{value:g}" if isinstance(value, float) else str(value)]
+    return shlex.join(words)
 
 
 def _bench(arguments: argparse.Namespace) -> int:

@@ -1,0 +1,117 @@
+"""Tasks as a learner sees them: what its episodes earned is noted, and it may correct a gait."""
+
+import pickle
+from collections import defaultdict
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+from gymnasium import spaces
+from numpy.typing import NDArray
+from stable_baselines3.common.vec_env import VecEnvWrapper
+from stable_baselines3.common.vec_env.base_vec_env import VecEnvStepReturn
+
+from tca_mj.agents.policy import with_clock
+from tca_mj.agents.sb3_env import TaskVecEnv
+from tca_mj.agents.tetrapod_gaits import GaitPolicy
+
+Observations = NDArray[np.float32]
+
+
+class LearningEnv(VecEnvWrapper):
+    """Several tasks, and statistics of their episodes.
+
+    With ``walker`` an action is a correction of the temperatures of a gait, 1 being ``bound``, and
+    an observation ends with sine and cosine of the gait's phase: what is learned is the network of
+    a ``tca_mj.agents.policy.ResidualPolicy``.
+
+    Attributes:
+        finished: For every episode that ended since it was last emptied: ``return``, ``length``,
+            ``success``, ``early_end`` and each reward term.
+    """
+
+    venv: TaskVecEnv
+
+    def __init__(
+        self,
+        venv: TaskVecEnv,
+        walker: Callable[[], GaitPolicy] | None = None,
+        bound: float = 0.0,
+    ) -> None:
+        """Wraps ``venv``.
+
+        Args:
+            venv: The tasks.
+            walker: Makes the gait that is corrected; None for none.
+            bound: Largest correction [K].
+        """
+        seen: Any = venv.observation_space
+        if walker is not None:
+            low, high = np.append(seen.low, [-1.0, -1.0]), np.append(seen.high, [1.0, 1.0])
+            seen = spaces.Box(low.astype(np.float32), high.astype(np.float32), dtype=np.float32)
+        super().__init__(venv, observation_space=seen)
+        self.finished: list[dict[str, float]] = []
+        self._walkers = [walker() for _ in range(venv.num_envs)] if walker is not None else []
+        self._bound = bound
+        self._seen = np.zeros(venv.tasks.observation_space.shape or (), dtype=np.float32)
+        self._sums: list[dict[str, float]] = [defaultdict(float) for _ in range(venv.num_envs)]
+
+    def reset(self) -> Observations:
+        """Begins new episodes."""
+        self._sums = [defaultdict(float) for _ in range(self.num_envs)]
+        for walker in self._walkers:
+            walker.reset()
+        return self._with_clocks(self.venv.reset())
+
+    def step_async(self, actions: NDArray[np.float32]) -> None:
+        """Turns corrections into actions."""
+        if self._walkers:
+            actions = np.stack(
+                [
+                    walker.act(seen, self._bound * action.astype(np.float64))
+                    for walker, seen, action in zip(
+                        self._walkers, self._seen, actions, strict=True
+                    )
+                ]
+            )
+        self.venv.step_async(actions)
+
+    def step_wait(self) -> VecEnvStepReturn:
+        """Steps, and notes what was earned."""
+        observations, rewards, dones, infos = self.venv.step_wait()
+        for i, (reward, done, info) in enumerate(zip(rewards, dones, infos, strict=True)):
+            sums = self._sums[i]
+            sums["return"] += float(reward)
+            sums["length"] += 1.0
+            for name, term in info.get("reward_terms", {}).items():
+                sums[f"term_{name}"] += float(term)
+            if not done:
+                continue
+            over = "truncation_reason" in info or not info["TimeLimit.truncated"]
+            success = bool(info.get("success", info.get("is_success", False)))
+            sums |= {"success": float(success), "early_end": float(over and not success)}
+            self.finished.append(dict(sums))
+            self._sums[i] = defaultdict(float)
+            if self._walkers:
+                last = info["terminal_observation"]
+                info["terminal_observation"] = with_clock(last, self._walkers[i])
+                self._walkers[i].reset()
+        return self._with_clocks(observations), rewards, dones, infos
+
+    def _with_clocks(self, observations: Any) -> Observations:
+        if not self._walkers:
+            return observations
+        self._seen = observations
+        pairs = zip(observations, self._walkers, strict=True)
+        return np.stack([with_clock(row, walker) for row, walker in pairs])
+
+    def state(self) -> dict[str, Any]:
+        """All there is to it, to be given to ``restore``."""
+        kept = {name: getattr(self, name) for name in ("finished", "_walkers", "_seen", "_sums")}
+        return {"venv": pickle.dumps(self.venv), "kept": pickle.dumps(kept)}
+
+    def restore(self, state: Mapping[str, Any]) -> None:
+        """Goes on where ``state`` was taken."""
+        self.venv = pickle.loads(state["venv"])
+        for name, value in pickle.loads(state["kept"]).items():
+            setattr(self, name, value)

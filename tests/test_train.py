@@ -1,0 +1,237 @@
+"""Training by Stable-Baselines3: a run that was broken off ends as one that was not, to the bit."""
+
+import csv
+import os
+import signal
+import subprocess
+import sys
+import time
+from dataclasses import replace
+
+import gymnasium as gym
+import numpy as np
+import pytest
+import torch
+from stable_baselines3.common.vec_env import VecNormalize
+
+from tca_mj.agents import config as settings
+from tca_mj.agents.config import OffPolicy, OnPolicy, TrainConfig, default_config
+from tca_mj.agents.export import exported
+from tca_mj.agents.learning_env import LearningEnv
+from tca_mj.agents.policy import ResidualPolicy, SavedPolicy, load_policy
+from tca_mj.agents.sb3_env import TaskVecEnv
+from tca_mj.agents.tetrapod_gaits import GaitPolicy
+from tca_mj.agents.train import Run, RunFolder, _learner, train
+from tca_mj.cli import main
+from tca_mj.registry import TASKS
+
+QUICK = "TCA/MorphModule-v0"
+WALK = "TCA/TetrapodWalk-v0"
+REMEMBERED = OffPolicy(
+    buffer_size=60, learning_starts=16, gradient_steps=1, batch_size=8, hidden=(8,)
+)
+LEARNERS = {
+    "ppo": OnPolicy(n_steps=10, batch_size=20, n_epochs=2, hidden=(8,)),
+    "sac": REMEMBERED,
+    "td3": REMEMBERED,
+}
+
+
+def tiny(algorithm, **change):
+    good = {"task": QUICK, "algorithm": algorithm, "learner": LEARNERS[algorithm], "steps": 120,
+            "envs": 2, "interval": 20, "evaluate_every": 2, "evaluation_episodes": 1}  # fmt: skip
+    return TrainConfig(**good | change)
+
+
+def written(folder):
+    return {name: (folder / name).read_bytes() for name in ("curve.csv", "evaluations.csv")} | {
+        name: [a.tobytes() for a in SavedPolicy.read(folder / name).network.weights]
+        for name in ("best.npz", "last.npz")
+    }
+
+
+@pytest.fixture
+def quiet(monkeypatch):
+    """No TensorBoard and no recordings, which take longer than the rest."""
+
+    class Board:
+        def add_scalar(self, *_):
+            pass
+
+        flush = close = lambda self: None
+
+    monkeypatch.setattr("tca_mj.agents.runs.RunFolder.tensorboard", lambda self, step: Board())
+    monkeypatch.setattr(Run, "record", lambda self, video: None)
+
+
+@pytest.mark.usefixtures("quiet")
+@pytest.mark.parametrize("algorithm", LEARNERS)
+def test_a_run_that_is_broken_off_ends_as_one_that_is_not(algorithm, tmp_path, monkeypatch):
+    config = tiny(algorithm)
+    expected = train(config, tmp_path / "whole", progress=False)
+    step, left = LearningEnv.step_wait, 0
+
+    def breaking(self):
+        nonlocal left
+        left -= 1
+        if left < 0:
+            raise KeyboardInterrupt
+        return step(self)
+
+    monkeypatch.setattr(LearningEnv, "step_wait", breaking)
+    for left in (27, 17, 200):  # amid intervals, off the edges of episodes  # noqa: B007
+        try:
+            found = train(config, tmp_path / "parts", progress=False)
+        except KeyboardInterrupt:
+            torch.manual_seed(99)  # a new process would be elsewhere
+            np.random.seed(99)
+    assert written(tmp_path / "parts") == written(tmp_path / "whole")
+    assert found.origin == expected.origin
+    rows = list(csv.DictReader((tmp_path / "whole" / "curve.csv").read_text().splitlines()))
+    assert [float(row["steps"]) for row in rows] == [20, 40, 60, 80, 100, 120]
+    assert sum(float(row["episodes"]) for row in rows) > 3
+    assert any(name.startswith("train/") for name in rows[0])
+
+
+SCRIPT = """
+import sys
+from pathlib import Path
+from tca_mj.agents.config import OnPolicy, TrainConfig
+from tca_mj.agents.train import train
+train(TrainConfig(learner=OnPolicy(**eval(sys.argv[2])), **eval(sys.argv[1])), Path(sys.argv[3]))
+"""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="needs signals")
+def test_a_run_that_is_killed_goes_on(tmp_path):
+    """By kill -9; with a correction of a gait, a recording and TensorBoard."""
+    learner = {"n_steps": 5, "batch_size": 10, "n_epochs": 1, "hidden": (8,)}
+    common = {"task": WALK, "algorithm": "ppo", "steps": 30, "envs": 2, "interval": 10,
+              "evaluate_every": 9, "evaluation_episodes": 1, "residual": 10.0,
+              "options": {"bend": np.radians(93.0).item()}}  # fmt: skip
+    config = TrainConfig(learner=OnPolicy(**learner), **common)
+    out = tmp_path / "killed"
+    run = subprocess.Popen([sys.executable, "-c", SCRIPT, repr(common), repr(learner), str(out)])
+    deadline = time.monotonic() + 100.0
+    while not (out / "curve.csv").is_file():
+        assert run.poll() is None and time.monotonic() < deadline
+        time.sleep(0.01)
+    os.kill(run.pid, signal.SIGKILL)
+    run.wait()
+    env = gym.make(WALK)
+    original = gym.make
+    try:  # episodes of three steps, for the sake of the time
+        gym.make = lambda id, **kwargs: original(id, max_episode_steps=3, **kwargs)
+        train(config, out, progress=False, video=False)
+        train(config, tmp_path / "whole", progress=False, video=False)
+    finally:
+        gym.make = original
+    assert written(out) == written(tmp_path / "whole")
+    assert (out / "best.rrd").is_file() and not list(out.glob("part-*"))
+    policy = load_policy(out / "best.npz", env)
+    assert isinstance(policy, ResidualPolicy) and policy.bound == 10.0
+    assert env.action_space.contains(policy.act(env.reset(seed=0)[0]))
+    with pytest.raises(ValueError, match=r"holds a run with .*residual 10\.0, not 20\.0"):
+        train(replace(config, residual=20.0), out, progress=False)
+
+
+@pytest.mark.parametrize("algorithm", LEARNERS)
+def test_an_exported_network_acts_as_the_learner_does(algorithm):
+    env = VecNormalize(LearningEnv(TaskVecEnv.make(QUICK, 2)), clip_obs=3.0)
+    env.obs_rms.mean[:], env.obs_rms.var[:] = 0.3, 2.0
+    learner = replace(LEARNERS[algorithm], hidden=(16, 16))
+    model = _learner(tiny(algorithm, learner=learner), env)
+    network = exported(model, env)
+    random = np.random.default_rng(0)
+    for _ in range(20):
+        seen = random.normal(0.0, 5.0, network.inputs).astype(np.float32)
+        action, _ = model.predict(env.normalize_obs(seen[None]), deterministic=True)
+        np.testing.assert_allclose(network(seen), action[0], atol=2e-6)
+
+
+def test_the_residual_learner_sees_and_does_what_the_policy_will():
+    """A correction of nothing is the gait; the clock starts anew with every episode."""
+    env = LearningEnv(TaskVecEnv.make(WALK, 2, max_episode_steps=4), lambda: GaitPolicy.of("walk"),
+                      20.0)  # fmt: skip
+    single, script = gym.make(WALK, max_episode_steps=4), GaitPolicy.of("walk")
+    env.seed(3)
+    seen = env.reset()
+    observation, _ = single.reset(seed=3)
+    assert seen.shape == (2, 68) and env.observation_space.shape == (68,)
+    zero = np.zeros((2, 12), dtype=np.float32)
+    for _ in range(4):
+        np.testing.assert_array_equal(seen[0, :66], observation)
+        angle = 2.0 * np.pi * script.cycle
+        np.testing.assert_allclose(seen[0, 66:], [np.sin(angle), np.cos(angle)], atol=1e-6)
+        observation, *_ = single.step(script.act(observation))
+        seen, _, dones, infos = env.step(zero)
+    assert dones.all() and env.observation_space.contains(infos[0]["terminal_observation"])
+    np.testing.assert_array_equal(infos[0]["terminal_observation"][:66], observation)
+    np.testing.assert_array_equal(seen[:, 66:], [[0.0, 1.0]] * 2)
+    assert [row["length"] for row in env.finished] == [4.0, 4.0]
+    row = env.finished[0]
+    assert row["return"] == pytest.approx(sum(v for k, v in row.items() if k[:5] == "term_"),
+                                          rel=1e-5)  # fmt: skip
+    assert (row["success"], row["early_end"]) == (0.0, 0.0)
+
+
+@pytest.mark.usefixtures("quiet")
+@pytest.mark.parametrize("algorithm", LEARNERS)
+@pytest.mark.parametrize("task", [task.id for task in TASKS])
+def test_every_task_has_a_default(task, algorithm, tmp_path):
+    config = default_config(task, algorithm, seed=4, envs=1)
+    assert config.seed == 4 and config.task == task
+    run = Run(config, RunFolder(tmp_path, config, ""), "")
+    action = run.policy().make().act(run.test_env.reset(seed=0, options=dict(config.options))[0])
+    assert run.test_env.action_space.contains(action)
+    run.close()
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"task": "Ant-v5"}, "task must be one of this package's"),
+        ({"algorithm": "dqn"}, "algorithm must be one of"),
+        ({"algorithm": "sac"}, "learner must be OffPolicy, got OnPolicy"),
+        ({"steps": 0}, "steps must be"),
+        ({"residual": 60.0}, "residual must be between 0 and 50 K"),
+        ({"residual": 10.0}, "which has no gait"),
+    ],
+)
+def test_impossible_settings_are_refused(change, message):
+    good = {"task": QUICK, "algorithm": "ppo", "learner": OnPolicy()}
+    TrainConfig(**good)
+    with pytest.raises(ValueError, match=message):
+        TrainConfig(**good | change)
+
+
+@pytest.mark.parametrize(
+    ("kind", "change", "message"),
+    [
+        (OnPolicy, {"gamma": 1.1}, "gamma must be above 0"),
+        (OnPolicy, {"n_steps": 0}, "n_steps must be"),
+        (OffPolicy, {"hidden": ()}, "hidden must be widths"),
+        (OffPolicy, {"tau": 0.0}, "tau must be"),
+    ],
+)
+def test_impossible_learners_are_refused(kind, change, message):
+    with pytest.raises(ValueError, match=message):
+        kind(**change)
+
+
+def test_the_command_makes_the_settings(monkeypatch, tmp_path):
+    asked = []
+    monkeypatch.setattr(
+        "tca_mj.agents.train.train",
+        lambda config, out, *, command, video: asked.append((config, out, command, video)),
+    )
+    out = ["--out", str(tmp_path), "--no-video"]
+    arguments = ["train", WALK, "--algo", "ppo", "--residual", "15", "--envs", "3", "--seeds", "2"]
+    assert main([*arguments, "--steps", "5000", *out]) == 0
+    (first, folder, command, video), (second, *_) = asked
+    assert first == settings.default_config(
+        WALK, "ppo", residual=15.0, envs=3, steps=5000, seed=0, start="scripted"
+    )
+    assert second.seed == 1 and folder == tmp_path / "seed_0" and not video
+    assert command.startswith(f"tca-mj train {WALK} --algo ppo")
+    assert main(["train", QUICK, "--algo", "sac", "--residual", "15", *out]) == 2
