@@ -1,4 +1,4 @@
-"""The scripted demos from beginning to end, with everything that is kept of them."""
+"""Demos from beginning to end, with everything that is kept of them."""
 
 from pathlib import Path
 from typing import Any
@@ -6,10 +6,15 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 
+from tca_mj.agents.actors import actor
 from tca_mj.agents.course import CourseWalker
 from tca_mj.agents.episode import RECORDING, Episode, Policy
+from tca_mj.agents.evaluate import Evaluation
 from tca_mj.agents.scripted import PickAndPlace
-from tca_mj.envs.arm import OBSERVATION
+from tca_mj.envs.arm import OBSERVATION, ArmPickPlace
+from tca_mj.envs.course import TetrapodCourse
+from tca_mj.envs.morph import MorphModule
+from tca_mj.envs.tetrapod import TetrapodGait
 from tca_mj.envs.wrappers import RecordRerun
 
 TASK = "TCA/ArmPickPlace-v0"
@@ -66,18 +71,12 @@ def pick_and_place(
         KeyboardInterrupt: As it came, after everything was written.
     """
     env, limit = _made(TASK, out, speed, max_duration)
-    sim = _task(env).sim
-    tip = sim.model.site("arm.bending.tip").id
-
-    def bend() -> float:
-        # Angle between the bending module's tip and straight down, which is its z axis at rest.
-        down = -sim.data.site_xmat[tip][8]
-        return float(np.degrees(np.arccos(np.clip(down, -1.0, 1.0))))
-
+    task = _task(env)
     acting: Any = policy or PickAndPlace()
     episode = Episode(
-        env, acting, seed=seed, out=out, bend=bend, options={"object": object}, title=object
-    )
+        env, acting, seed=seed, out=out, bend=lambda: _bent(task), options={"object": object},
+        title=object,
+    )  # fmt: skip
 
     def summary() -> dict[str, Any]:
         seen = OBSERVATION.read(np.asarray(episode.observation, dtype=np.float64))
@@ -139,7 +138,7 @@ def tetrapod_course(
 
     def bend() -> float:
         places.append(float(task.position[0]))
-        return float(np.degrees(task.body_angle))
+        return _bent(task)
 
     episode = Episode(
         env, acting, seed=seed, out=out, bend=bend, options={"randomise": randomise},
@@ -161,6 +160,65 @@ def tetrapod_course(
     return episode.run(limit, speed=speed, video=video, progress=progress, summary=summary)
 
 
+def play(
+    task: str,
+    policy: str | Path,
+    *,
+    seed: int = 0,
+    out: Path | None = None,
+    randomise: float = 0.0,
+    video: bool = True,
+    speed: float = 8.0,
+    max_duration: float | None = None,
+    progress: bool = True,
+) -> dict[str, Any]:
+    """Runs one episode of any policy in any task and writes what happened.
+
+    Files and their fate are those of ``pick_and_place``.
+
+    Args:
+        task: Gymnasium id.
+        policy: Who acts, see ``tca_mj.agents.actors.actor``.
+        seed: Seed of the episode.
+        out: Folder for the files, made if it is missing; None to write nothing.
+        randomise: Share by which the robot is off, see ``tca_mj.agents.evaluate.Evaluation``.
+        video: Whether to make the film.
+        speed: Simulated seconds per second of film.
+        max_duration: Simulated time after which to stop [s]; None for the task's own limit.
+        progress: Whether to show a progress bar, where there is a terminal.
+
+    Returns:
+        The summary: the keys of ``pick_and_place`` that do not speak of an object, and
+
+        * ``policy``, ``heater_energy`` [J] of each spine, ``return``
+        * ``distance`` and ``drift`` [m], of a robot that gets on
+
+    Raises:
+        FileNotFoundError: If there is no such policy.
+        ValueError: If it is for another task, or an argument cannot be used.
+        KeyboardInterrupt: As it came, after everything was written.
+    """
+    options = Evaluation(task=task, policy=str(policy), randomise=randomise).options
+    env, limit = _made(task, None, speed, max_duration)
+    acting = actor(policy, env, seed=seed)  # before a file is touched
+    acting.reset()
+    told = _task(env)
+    episode = Episode(
+        env if out is None else RecordRerun(env, out / RECORDING), acting, seed=seed, out=out,
+        bend=lambda: _bent(told), options=options, camera=told.camera, title=f"{policy} in {task}",
+    )  # fmt: skip
+
+    def summary() -> dict[str, Any]:
+        heater = dict(zip(told.sim.spines.names, told.sim.spines.energy.tolist(), strict=True))
+        known = {key: float(episode.info.get(key, np.nan)) for key in ("distance", "drift")}
+        return {
+            "task": task, "policy": str(policy), **episode.summary(), "heater_energy": heater,
+            "return": episode.total, **{k: v for k, v in known.items() if np.isfinite(v)},
+        }  # fmt: skip
+
+    return episode.run(limit, speed=speed, video=video, progress=progress, summary=summary)
+
+
 def _made(
     task: str, out: Path | None, speed: float, max_duration: float | None
 ) -> tuple[gym.Env[Any, Any], float]:
@@ -178,6 +236,19 @@ def _made(
 
 def _task(env: gym.Env[Any, Any]) -> Any:
     return env.unwrapped
+
+
+def _bent(task: Any) -> float:
+    """What of the robot is bent, by which angle [deg]: spines, or the bending module's tip."""
+    if isinstance(task, TetrapodGait):
+        return float(np.degrees(task.stance.bend(task.data)))
+    if isinstance(task, TetrapodCourse):
+        return float(np.degrees(task.body_angle))
+    if isinstance(task, MorphModule):
+        return float(np.degrees(task.angle))
+    name = "arm.bending.tip" if isinstance(task, ArmPickPlace) else "bench.module.tip"
+    down = -task.data.site(name).xmat[8]  # the module's z axis is straight down at rest
+    return float(np.degrees(np.arccos(np.clip(down, -1.0, 1.0))))
 
 
 def _speeds(

@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from tca_mj.envs.wrappers import RecordRerun, how_it_ended
+from tca_mj.envs.base import how_it_ended
+from tca_mj.envs.wrappers import RecordRerun
 from tca_mj.film import Film
 from tca_mj.machine import machine, versions
 from tca_mj.plots import rollout_plot
@@ -66,6 +67,7 @@ class Episode:
         self.sim = task.sim
         self.ending = ""
         self.success = False
+        self.total = 0.0  # of the rewards
         self.held_until = ""  # phase in which an object was last touched
         self.wall: dict[str, float] = defaultdict(float)
         self.left_out: dict[str, str] = {}
@@ -133,7 +135,8 @@ class Episode:
                 self.phases.append((self.sim.time, phase))
                 self._event(phase)
             step = self.env.step(action)
-        self.observation, _, terminated, truncated, self.info = step
+        self.observation, reward, terminated, truncated, self.info = step
+        self.total += float(reward)
         self.wall["simulation"] -= self._recorded() - recorded
         self.wall["recording"] = self._recorded()
         self._sample()

@@ -92,6 +92,11 @@ class SimulatedTask(gym.Env[Observation, Action], ABC):
         """Time of one step [s]."""
         return self.control_period
 
+    @property
+    def camera(self) -> str:
+        """Name of the camera of the pictures."""
+        return self._camera
+
     def paint(self) -> None:
         """Gives what is hot the colour of its temperature; no physics reads it."""
         colour_tendons(self.model, self.sim.tendon, self.sim.temperature)
@@ -119,3 +124,12 @@ class SimulatedTask(gym.Env[Observation, Action], ABC):
         if self._screen is not None:
             self._screen.close()
             self._screen = None
+
+
+def how_it_ended(terminated: bool, truncated: bool, info: dict[str, Any]) -> str | None:
+    """Why an episode is over, in a few words; None if it goes on."""
+    if terminated:
+        return "success" if info.get("success") else info.get("termination_reason", "terminated")
+    if truncated:
+        return info.get("truncation_reason", "time limit")
+    return None

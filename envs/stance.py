@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from tca_mj.model.part import Part
 from tca_mj.model.scene import scene
 from tca_mj.robots.tetrapod import LEGS, TetrapodSpec, tetrapod
+from tca_mj.robots.tetrapod_fine import fine_tetrapod
 from tca_mj.sim import Simulation
 
 Array = NDArray[np.float64]
@@ -46,7 +47,13 @@ _HALVINGS = 14
 
 
 def tetrapod_scene(
-    arena: Path, objects: Mapping[str, Path], spec: TetrapodSpec, *, timestep: float, period: float
+    arena: Path,
+    objects: Mapping[str, Path],
+    spec: TetrapodSpec,
+    *,
+    timestep: float,
+    period: float,
+    fine: bool = False,
 ) -> Simulation:
     """The robot ``robot`` in an arena, with contacts that suit its light feet and with ``CAMERAS``.
 
@@ -56,12 +63,19 @@ def tetrapod_scene(
         spec: The robot.
         timestep: Physics time step [s].
         period: Time between two updates of the TCAs [s].
+        fine: Whether each spine is a chain of its own and the legs twist, see ``fine_tetrapod``.
 
     Raises:
         ValueError: If a file is missing, a time is bad or the robot cannot be built.
     """
-    part = scene(arena, tetrapod(spec), objects, name="robot")
+    if fine:
+        robot = fine_tetrapod(spec, nodes=spec.nodes, leg_nodes=spec.leg.nodes)
+    else:
+        robot = tetrapod(spec)
+    part = scene(arena, robot, objects, name="robot")
     _soften(part)
+    if fine:  # its welds are harder than MuJoCo takes them otherwise
+        part.spec.option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_REFSAFE)
     hub = part.spec.body("robot.hub")
     for name, (place, towards) in _VIEWS.items():
         camera = hub.add_camera(name=name, pos=place, quat=_looking(place, towards), fovy=38.0)
@@ -110,12 +124,18 @@ class Stance:
         self._q, self._v = int(model.jnt_qposadr[root]), int(model.jnt_dofadr[root])
 
         def address(names: list[str]) -> NDArray[np.int64]:
-            return np.array([model.jnt_qposadr[model.joint(name).id] for name in names])
+            return np.array(
+                [model.jnt_qposadr[model.joint(name).id] for name in names], dtype=np.int64
+            )
 
         sides = {"left": -1.0, "right": 1.0}
         spine = {s: [f"robot.{s}.bend_x{i}" for i in range(spec.nodes)] for s in sides}
         self._bends = address([name for names in spine.values() for name in names])
         self._signs = np.repeat(list(sides.values()), spec.nodes)
+        joints = [model.joint(i).name for i in range(model.njnt)]
+        # Spines of the fine model that run beside the middle one, from the right rail to the left.
+        beside = [name for name in joints if name.startswith("robot.outer") and ".bend_x" in name]
+        self._beside = address(beside)
         nodes = range(spec.leg.nodes)
         self._lifts = address([f"robot.{leg}.rod.bend_y{i}" for leg in LEGS for i in nodes])
         bodies = [model.body(int(body)).name for body in model.geom_bodyid]
@@ -178,6 +198,7 @@ class Stance:
 
         def place(data: mujoco.MjData) -> None:
             data.qpos[self._bends] = self._signs * bend / len(self._bends)
+            data.qpos[self._beside] = -bend / len(self._bends)
             turn = (math.cos(yaw / 2.0), 0.0, 0.0, math.sin(yaw / 2.0))
             data.qpos[self._q : self._q + 7] = (*position, above, *turn)
 

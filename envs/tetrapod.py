@@ -119,6 +119,7 @@ class TetrapodGait(SimulatedTask):
         gait: str = "walk",
         render_mode: str | None = None,
         robot: TetrapodSpec | None = None,
+        fine: bool = False,
         timestep: float = 5e-3,
         camera: str = "follow",
         size: tuple[int, int] = (960, 720),
@@ -129,6 +130,9 @@ class TetrapodGait(SimulatedTask):
             gait: ``crawl``, ``walk`` or ``shimmy``.
             render_mode: None or ``"rgb_array"``.
             robot: The robot, by default the published one as far as it is known.
+            fine: Whether each spine is a chain of its own and the legs twist, as in the model that
+                certifies this one (``tca_mj.robots.tetrapod_fine``). It asks for a time step of
+                2 ms: with a longer one its contacts are harder than those of the other model.
             timestep: Physics time step, of which ``control_period`` is a multiple [s].
             camera: Camera of the pictures, one of ``CAMERAS``; all follow the robot.
             size: Width and height of the pictures [pixels].
@@ -156,6 +160,7 @@ class TetrapodGait(SimulatedTask):
             self.robot,
             timestep=timestep,
             period=self.control_period,
+            fine=fine,
         )
         self.stance = Stance(self.sim, self.robot)
         self.observation_space = OBSERVATION.space

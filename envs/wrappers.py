@@ -9,6 +9,7 @@ import gymnasium as gym
 from gymnasium.core import ActType, ObsType
 from gymnasium.utils import RecordConstructorArgs
 
+from tca_mj.envs.base import how_it_ended
 from tca_mj.record import Recorder
 from tca_mj.rod.beam import require_count, require_positive
 
@@ -132,12 +133,3 @@ class RecordRerun(gym.Wrapper[ObsType, ActType, ObsType, ActType], RecordConstru
         finally:
             self.seconds += time.perf_counter() - start
             self.env.close()
-
-
-def how_it_ended(terminated: bool, truncated: bool, info: dict[str, Any]) -> str | None:
-    """Why an episode is over, in a few words; None if it goes on."""
-    if terminated:
-        return "success" if info.get("success") else info.get("termination_reason", "terminated")
-    if truncated:
-        return info.get("truncation_reason", "time limit")
-    return None

@@ -12,6 +12,7 @@ from tca_mj.registry import TASKS
 
 OBJECTS = ("screwdriver", "pcb")
 DEMOS = ("pick-and-place", "tetrapod")
+MODELS = ("used", "legs", "fine")
 POLICIES = ("scripted", "off", "random")
 ALGORITHMS = ("cma", "ppo", "sac", "td3")
 
@@ -24,13 +25,16 @@ examples:
   tca-mj list                                   the tasks
   tca-mj view TCA/ArmPickPlace-v0               watch it in a window
   tca-mj train TCA/TetrapodWalk-v0 --algo cma   search a faster gait
+  tca-mj eval scripted --task TCA/TetrapodWalk-v0 --out runs/walk     how good a policy is
+  tca-mj demo --policy scripted --task TCA/BendReach-v0     any policy, recorded and filmed
   tca-mj bench --out runs/bench                 how fast it is on this machine
   tca-mj validate tca --out runs/validation     the models against what is published
   tca-mj certify --out runs/certificate         the chains against the theory of rods
 """
 
 _DEMO = """\
-Runs one scripted episode and writes into the folder --out:
+Runs one scripted episode, or with --policy and --task one of any policy in any task, and writes
+into the folder --out:
   summary.json   success, energy, peak temperatures, duration, versions, machine
   rollout.rrd    everything over time; open it with `rerun rollout.rrd`
   rollout.mp4    a film (needs OpenGL and `pip install 'tca-mj[demo]'`)
@@ -43,6 +47,28 @@ examples:
   tca-mj demo pick-and-place --object pcb
   tca-mj demo pick-and-place --seed 7 --no-video      much faster
   tca-mj demo tetrapod --randomise 0.2 --seed 3       with 20 % more or less friction
+  tca-mj demo --policy scripted --task TCA/TetrapodWalk-v0
+  tca-mj demo --policy runs/train/TetrapodWalk-cma/best.json --task TCA/TetrapodWalk-v0
+"""
+
+_EVAL = """\
+Runs episodes of a policy in a task and writes into the folder --out:
+  episodes.jsonl   one line for each finished episode; the same command again goes on from there
+  summary.json     mean, 95 % interval, least and most of every figure, the settings, versions
+  summary.md       the same as text
+
+Figures: return, success (of a gait: the end of its time was reached), duration, speed, distance,
+drift, energy, energy per metre, cost of transport E/(m g d), peak temperature and tension.
+Intervals of means are Student's t over episodes, of success Wilson's, of the two ratios bootstrap.
+Nothing depends on --workers.
+
+POLICY is scripted, off (no power), random, a shipped policy's name, a policy's file, or the folder
+of a training run, whose best policy is taken.
+
+examples:
+  tca-mj eval scripted --task TCA/BendReach-v0 --episodes 20 --randomise 0.2
+  tca-mj eval runs/train/TetrapodWalk-cma --task TCA/TetrapodWalk-v0 --workers 2
+  tca-mj eval scripted --task TCA/TetrapodWalk-v0 --model fine --timestep 0.002 --episodes 3
 """
 
 _VIEW = """\
@@ -156,16 +182,20 @@ def _parser() -> argparse.ArgumentParser:
     demo = commands.add_parser(
         "demo", help="run a scripted demo and record it", description=_DEMO, formatter_class=style
     )
-    demo.add_argument("name", choices=DEMOS, help="which demo")
+    demo.add_argument("name", nargs="?", choices=DEMOS, help="which demo")
+    demo.add_argument("--policy", help=f"{', '.join(POLICIES)}, a shipped one, a file or a run")
+    demo.add_argument(
+        "--task", choices=[task.id for task in TASKS], metavar="TASK", help="the policy's task"
+    )
     demo.add_argument(
         "--object", choices=OBJECTS, default="screwdriver", help="what pick-and-place picks up"
     )
     demo.add_argument(
         "--randomise", type=float, default=0.0, metavar="SHARE",
-        help="share by which the tetrapod's friction is drawn at random, 0 to 0.5; default 0",
+        help="share by which the robot is off (tetrapod: its friction), 0 to 0.5; default 0",
     )
     demo.add_argument("--seed", type=_seed, default=0, help="places of object and cup; default 0")
-    demo.add_argument("--out", type=_folder, help="folder; default runs/demo/OBJECT or /tetrapod")
+    demo.add_argument("--out", type=_folder, help="folder; default runs/demo/ and what")
     demo.add_argument(
         "--video", action=argparse.BooleanOptionalAction, default=True,
         help="make the film, which takes most of the time",
@@ -185,6 +215,30 @@ def _parser() -> argparse.ArgumentParser:
     view.add_argument("--object", choices=OBJECTS, help="default: drawn at random")
     view.add_argument("--seed", type=_seed, default=0, help="seed of the first episode; default 0")
     view.set_defaults(run=_view)
+
+    evaluation = commands.add_parser(
+        "eval", help="measure how good a policy is", description=_EVAL, formatter_class=style
+    )
+    evaluation.add_argument("policy", metavar="POLICY", help="who acts")
+    evaluation.add_argument(
+        "--task", choices=[task.id for task in TASKS], metavar="TASK", required=True, help="its id"
+    )
+    evaluation.add_argument("--episodes", type=_count, default=10, help="default 10")
+    evaluation.add_argument("--seed", type=_seed, default=0, help="of the first episode; default 0")
+    evaluation.add_argument(
+        "--randomise", type=float, default=0.0, metavar="SHARE",
+        help="share by which the robot is drawn to be off, 0 to 0.5; default 0",
+    )
+    evaluation.add_argument("--steps", type=_count, help="of an episode; default: the task's")
+    evaluation.add_argument(
+        "--model", choices=MODELS, default="used",
+        help="of the tetrapod: used, legs (finer, they twist), fine (and single spines)",
+    )
+    evaluation.add_argument("--timestep", type=float, help="of the physics; default: the task's")
+    evaluation.add_argument("--out", type=_folder, help="folder; default runs/eval/TASK-POLICY")
+    evaluation.add_argument("--workers", type=_count, default=1, help="processes; default 1")
+    evaluation.add_argument("--fresh", action="store_true", help="forget what the folder holds")
+    evaluation.set_defaults(run=_eval)
 
     train = commands.add_parser(
         "train", help="train a policy", description=_TRAIN, formatter_class=style
@@ -263,12 +317,22 @@ def _folder(text: str) -> Path:
 
 
 def _demo(arguments: argparse.Namespace) -> int:
-    from tca_mj.agents.demo import pick_and_place, tetrapod_course
+    from tca_mj.agents.demo import pick_and_place, play, tetrapod_course
 
+    free = arguments.policy is not None
+    if free == (arguments.name is not None) or free != (arguments.task is not None):
+        print("tca-mj demo: give a demo's name, or --policy and --task", file=sys.stderr)
+        return 2
     course = arguments.name == "tetrapod"
-    out = arguments.out or Path("runs/demo") / ("tetrapod" if course else arguments.object)
+    place = _short(arguments.task) if free else "tetrapod" if course else arguments.object
+    out = arguments.out or Path("runs/demo") / place
     try:
-        if course:
+        if free:
+            summary = play(
+                arguments.task, arguments.policy, seed=arguments.seed, out=out,
+                randomise=arguments.randomise, video=arguments.video,
+            )  # fmt: skip
+        elif course:
             summary = tetrapod_course(
                 seed=arguments.seed, out=out, randomise=arguments.randomise, video=arguments.video
             )
@@ -279,6 +343,9 @@ def _demo(arguments: argparse.Namespace) -> int:
     except KeyboardInterrupt:
         print(f"interrupted; what was recorded is in {out}", file=sys.stderr)
         return 130
+    except (FileNotFoundError, ValueError) as error:
+        print(f"tca-mj demo: {error}", file=sys.stderr)
+        return 2
     if course:
         print(speed_table(summary))
     print(outcome(summary))
@@ -289,7 +356,11 @@ def _demo(arguments: argparse.Namespace) -> int:
 
 def outcome(summary: dict[str, Any]) -> str:
     """One line on how a demo ended, from its summary."""
-    if "object" in summary:
+    if "policy" in summary:
+        where = "has success" if summary["success"] else "has come to its end"
+        who = f"{summary['policy']} in {summary['task']}"
+        energy = sum(summary["energy"].values()) + sum(summary["heater_energy"].values())
+    elif "object" in summary:
         where = "is in the cup" if summary["success"] else "is not in the cup"
         who, energy = f"the {summary['object']}", sum(summary["energy"].values())
     else:
@@ -358,48 +429,37 @@ def _view(arguments: argparse.Namespace) -> int:
 
 def _policy(name: str, env: Any, seed: int) -> Any:
     """A policy for the viewer."""
-    from importlib import import_module
-
-    import numpy as np
-
+    from tca_mj.agents.actors import actor
     from tca_mj.envs.viewer import ViewerPolicy
 
-    if name not in POLICIES:
-        from tca_mj.agents.policy import load_policy
-
-        loaded = load_policy(name, env)
-        return ViewerPolicy(loaded.act, loaded.reset)
-    if name == "scripted":
-        script = scripted(env.unwrapped)
-        return ViewerPolicy(script.act, script.reset)
-    if name == "random":
-        env.action_space.seed(seed)
-        return ViewerPolicy(lambda observation: env.action_space.sample())
-    # No power, and everything else in the middle of its range.
-    table = import_module(type(env.unwrapped).__module__).ACTION
-    space = env.action_space
-    still = np.array(0.5 * (space.low + space.high), dtype=space.dtype)
-    for entry in table.entries:
-        if "power" in entry.name or "voltage" in entry.name:
-            still[table.slices[entry.name]] = space.low[table.slices[entry.name]]
-    return ViewerPolicy(lambda observation: still)
+    found = actor(name, env, seed=seed)
+    return ViewerPolicy(found.act, found.reset)
 
 
-def scripted(task: Any) -> Any:
-    """The scripted policy of a task, with ``act`` and ``reset``."""
-    from tca_mj.agents.course import CourseWalker
-    from tca_mj.agents.morph import MorphPolicy
-    from tca_mj.agents.reach import ReachPolicy
-    from tca_mj.agents.scripted import PickAndPlace
-    from tca_mj.agents.tetrapod_gaits import GaitPolicy
+def _short(task: str) -> str:
+    """Name of a task's folder."""
+    return task.partition("/")[2].partition("-")[0]
 
-    name = type(task).__name__
-    if name == "TetrapodCourse":
-        return CourseWalker(task)
-    if name == "TetrapodGait":
-        return GaitPolicy.of(task.gait)
-    others: dict[str, Any] = {"BendReach": ReachPolicy, "MorphModule": MorphPolicy}
-    return others.get(name, PickAndPlace)()
+
+def _eval(arguments: argparse.Namespace) -> int:
+    from tca_mj.agents.evaluate import REPORT, Evaluation, evaluate, report
+
+    name = f"{_short(arguments.task)}-{Path(arguments.policy).stem}"
+    out = arguments.out or Path("runs/eval") / name
+    settings = ("task", "policy", "episodes", "seed", "randomise", "steps", "model", "timestep")
+    try:
+        evaluation = Evaluation(**{key: getattr(arguments, key) for key in settings})
+        summary = evaluate(
+            evaluation, out=out, workers=arguments.workers, fresh=arguments.fresh
+        )
+    except KeyboardInterrupt:
+        print(f"interrupted; what was finished is in {out}", file=sys.stderr)
+        return 130
+    except (FileNotFoundError, ValueError) as error:
+        print(f"tca-mj eval: {error}", file=sys.stderr)
+        return 2
+    print(f"{report(summary)}\n\n{out / REPORT}")
+    return 0
 
 
 def _train(arguments: argparse.Namespace) -> int:

@@ -14,7 +14,8 @@ from gymnasium.utils.env_checker import check_env
 from rerun.chunk import RrdReader
 
 from tca_mj.envs.arm import ArmPickPlace
-from tca_mj.envs.wrappers import RecordRerun, how_it_ended
+from tca_mj.envs.base import how_it_ended
+from tca_mj.envs.wrappers import RecordRerun
 
 
 @pytest.fixture(scope="module")

@@ -1,0 +1,116 @@
+"""Who acts in a task, by name: its script, nobody, chance, or a saved policy."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tca_mj.agents.course import CourseWalker
+from tca_mj.agents.morph import MorphPolicy
+from tca_mj.agents.policy import Policy, load_policy
+from tca_mj.agents.reach import ReachPolicy
+from tca_mj.agents.scripted import PickAndPlace
+from tca_mj.agents.tetrapod_gaits import GaitPolicy
+
+NAMES = ("scripted", "off", "random")
+
+_SCRIPTS: dict[str, Callable[[Any], Policy]] = {
+    "ArmPickPlace": lambda task: PickAndPlace(),
+    "BendReach": lambda task: ReachPolicy(task.module_spec),
+    "MorphModule": lambda task: MorphPolicy(),
+    "TetrapodCourse": CourseWalker,
+    "TetrapodGait": lambda task: GaitPolicy.of(task.gait),
+}
+
+
+@dataclass(slots=True)
+class Still:
+    """No power, and everything else in the middle of its range.
+
+    Attributes:
+        action: The action, always the same.
+    """
+
+    action: NDArray[np.float32]
+
+    @property
+    def phase(self) -> str:
+        return "off"
+
+    def reset(self) -> None:
+        """Nothing is remembered."""
+
+    def act(self, observation: NDArray[np.float32]) -> NDArray[np.float32]:
+        """The action, whatever is seen."""
+        return self.action.copy()
+
+
+@dataclass(slots=True)
+class Chance:
+    """Actions drawn evenly from the whole space.
+
+    Attributes:
+        size: Length of an action.
+        seed: Seed of the first episode; every further episode goes on drawing.
+    """
+
+    size: int
+    seed: int = 0
+    _random: np.random.Generator = field(init=False)
+
+    def __post_init__(self) -> None:
+        self._random = np.random.default_rng(self.seed)
+
+    @property
+    def phase(self) -> str:
+        return "random"
+
+    def reset(self) -> None:
+        """Nothing is remembered."""
+
+    def act(self, observation: NDArray[np.float32]) -> NDArray[np.float32]:
+        """An action, whatever is seen."""
+        return self._random.uniform(-1.0, 1.0, self.size).astype(np.float32)
+
+
+def actor(name: str | Path, env: Any, *, seed: int = 0) -> Policy:
+    """Who acts in an environment.
+
+    Args:
+        name: One of ``NAMES``, the name of a shipped policy, a policy's file, or the folder of a
+            training run, whose best policy is taken.
+        env: The Gymnasium environment.
+        seed: Seed of what is random.
+
+    Raises:
+        FileNotFoundError: If there is no such policy.
+        ValueError: If it is one for another task.
+    """
+    task = env.unwrapped
+    if str(name) not in NAMES:
+        return load_policy(best_of(name), env)
+    if name == "scripted":
+        return _SCRIPTS[type(task).__name__](task)
+    if name == "random":
+        return Chance(env.action_space.shape[0], seed)
+    table = import_module(type(task).__module__).ACTION
+    space = env.action_space
+    still = np.array(0.5 * (space.low + space.high), dtype=space.dtype)
+    for entry in table.entries:
+        if "power" in entry.name or "voltage" in entry.name:
+            still[table.slices[entry.name]] = space.low[table.slices[entry.name]]
+    return Still(still)
+
+
+def best_of(name: str | Path) -> str | Path:
+    """The file of the best policy, if ``name`` is the folder of a training run; else ``name``."""
+    if not Path(name).is_dir():
+        return name
+    for file in ("best.json", "best.npz"):
+        if (Path(name) / file).is_file():
+            return Path(name) / file
+    raise FileNotFoundError(f"no best.json and no best.npz in {name}")

@@ -1,0 +1,409 @@
+"""How good a policy is: episodes of a task, their figures, means and intervals.
+
+Each finished episode is one line of ``episodes.jsonl``; a second run goes on where the first one
+stopped. An episode depends on its seed and on the settings alone, not on the process that runs it
+or on the episodes before it.
+"""
+
+import hashlib
+import json
+import multiprocessing
+import os
+from collections.abc import Iterable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+from numpy.typing import NDArray
+from tqdm import tqdm
+
+import tca_mj  # noqa: F401  (registers the tasks in a new process)
+from tca_mj.agents.actors import NAMES, actor, best_of
+from tca_mj.agents.policy import find, write_whole
+from tca_mj.envs.base import how_it_ended
+from tca_mj.machine import machine, versions
+from tca_mj.modules.leg import LegSpec
+from tca_mj.registry import TASKS
+from tca_mj.robots.tetrapod import TetrapodSpec
+
+EPISODES, SUMMARY, REPORT = "episodes.jsonl", "summary.json", "summary.md"
+MODELS = ("used", "legs", "fine")
+
+# Name, unit, factor to the unit, and digits of what is reported.
+METRICS = {
+    "return": ("", 1.0, 2),
+    "success": ("%", 100.0, 0),
+    "duration": ("s", 1.0, 1),
+    "speed": ("mm/s", 1e3, 2),
+    "distance": ("mm", 1e3, 1),
+    "drift": ("mm", 1e3, 1),
+    "energy": ("J", 1.0, 1),
+    "energy_per_metre": ("kJ/m", 1e-3, 2),
+    "cost_of_transport": ("", 1.0, 0),
+    "peak_temperature": ("°C", 1.0, 1),
+    "peak_tension": ("N", 1.0, 3),
+}
+_RATIOS = ("energy_per_metre", "cost_of_transport")
+_LEVEL, _RESAMPLES = 0.95, 10_000
+
+# A finer leg of the same mass: a leg has a plate at its root and behind each node.
+_FINE_LEG = LegSpec(
+    nodes=10, motions=("bend_x", "bend_y", "twist"), plate_fill=LegSpec().plate_fill * 6.0 / 11.0
+)
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Evaluation:
+    """What is evaluated.
+
+    Attributes:
+        task: Gymnasium id.
+        policy: Who acts, see ``tca_mj.agents.actors.actor``.
+        episodes: How many episodes, at least 1.
+        seed: Seed of the first one; the others follow.
+        randomise: Share by which the robot is off, as the task's option ``randomise`` (in the
+            course ``randomise_robot`` as well); 0 is nominal.
+        steps: Control steps after which an episode is over; None for the task's own limit.
+        model: ``used``; or, for the tetrapod's gaits, ``legs`` (ten nodes a leg, which twist, of
+            the same mass) or ``fine`` (those legs, and every spine a chain of its own).
+        timestep: Physics time step [s]; None for the task's own.
+
+    Raises:
+        ValueError: If something is unknown or out of range.
+    """
+
+    task: str
+    policy: str = "scripted"
+    episodes: int = 10
+    seed: int = 0
+    randomise: float = 0.0
+    steps: int | None = None
+    model: str = "used"
+    timestep: float | None = None
+
+    def __post_init__(self) -> None:
+        known = [task.id for task in TASKS]
+        if self.task not in known:
+            raise ValueError(f"task must be one of {known}, got {self.task!r}")
+        if self.model not in MODELS:
+            raise ValueError(f"model must be one of {MODELS}, got {self.model!r}")
+        if self.model != "used" and not self._is_gait:
+            raise ValueError(f"model must be 'used' for {self.task}, got {self.model!r}")
+        if not 0.0 <= self.randomise <= 0.5:
+            raise ValueError(f"randomise must be between 0 and 0.5, got {self.randomise}")
+        if self.randomise and not self._options(self.randomise):
+            raise ValueError(f"randomise must be 0, as {self.task} varies nothing")
+        for name, value, least in (
+            ("episodes", self.episodes, 1), ("seed", self.seed, 0), ("steps", self.steps, 1)
+        ):  # fmt: skip
+            if value is not None and (int(value) != value or value < least):
+                raise ValueError(f"{name} must be a whole number of at least {least}, got {value}")
+
+    @property
+    def _is_gait(self) -> bool:
+        return self.task in {task.id for task in TASKS if "gait" in task.kwargs}
+
+    def _options(self, share: float) -> dict[str, float]:
+        """Options of the reset that vary the robot."""
+        if self._is_gait or "BendReach" in self.task:
+            return {"randomise": share}
+        course = "TetrapodCourse" in self.task
+        return {"randomise": share, "randomise_robot": share} if course else {}
+
+    @property
+    def options(self) -> dict[str, float]:
+        """Options of the reset."""
+        return self._options(self.randomise) if self.randomise else {}
+
+    def key(self) -> str:
+        """Tells apart what must not be mixed: settings, the policy's contents, versions."""
+        settings = asdict(self)
+        del settings["episodes"], settings["seed"]
+        if self.policy not in NAMES:
+            settings["policy"] = hashlib.sha256(find(best_of(self.policy)).read_bytes()).hexdigest()
+        text = json.dumps([settings, versions()], sort_keys=True)
+        return hashlib.sha256(text.encode()).hexdigest()[:16]
+
+    def make(self) -> gym.Env[Any, Any]:
+        """The environment.
+
+        Raises:
+            ValueError: If the time step does not fit.
+        """
+        more: dict[str, Any] = {} if self.timestep is None else {"timestep": self.timestep}
+        if self.model != "used":
+            more["fine"] = self.model == "fine"
+            more["robot"] = TetrapodSpec(leg=_FINE_LEG, nodes=6 if more["fine"] else 4)
+        return gym.make(self.task, max_episode_steps=self.steps, **more)
+
+
+def run_episode(evaluation: Evaluation, seed: int) -> dict[str, Any]:
+    """One episode.
+
+    Returns:
+        ``seed``, ``steps``, ``ending``, and the figures of ``METRICS``: ``return``; ``success``
+        (what the task calls so; of a gait, whether it came to the end of its time); ``duration``
+        [s]; ``speed`` [m/s], ``distance`` and ``drift`` (its size) [m] where the robot gets on;
+        ``energy`` of TCAs and heaters [J]; ``weight`` [N] there; ``peak_temperature`` [°C] and
+        ``peak_tension`` [N] of the TCAs.
+    """
+    env = evaluation.make()
+    try:
+        policy = actor(evaluation.policy, env, seed=seed)
+        observation, info = env.reset(seed=seed, options=evaluation.options)
+        policy.reset()
+        task: Any = env.unwrapped
+        sim, start = task.sim, _place(info)
+        total, steps, ended, truncated = 0.0, 0, False, False
+        hottest, tightest = -np.inf, 0.0
+        while not ended:
+            observation, reward, terminated, truncated, info = env.step(policy.act(observation))
+            total, steps, ended = total + float(reward), steps + 1, terminated or truncated
+            hottest = max(hottest, float(sim.temperature.max()))
+            tightest = max(tightest, float(sim.tension.max()))
+        whole = bool(truncated and "truncation_reason" not in info)
+        row = {
+            "seed": seed,
+            "steps": steps,
+            "ending": how_it_ended(terminated, truncated, info) or "",
+            "return": total,
+            "success": bool(info.get("success", whole)),
+            "duration": float(sim.time),
+            "energy": float(sim.energy.sum() + sim.spines.energy.sum()),
+            "peak_temperature": hottest,
+            "peak_tension": tightest,
+        }
+        end = _place(info)
+        if start is not None and end is not None:
+            along, aside = end[0] - start[0], end[1] - start[1]
+            hub = task.model.body("robot.hub").id
+            row |= {
+                "distance": along,
+                "drift": abs(aside),
+                "speed": along / sim.time,
+                "weight": 9.81 * float(task.model.body_subtreemass[hub]),
+            }
+        return row
+    finally:
+        env.close()
+
+
+def _place(info: dict[str, Any]) -> tuple[float, float] | None:
+    """Where a robot that gets on is, along its way and aside [m]."""
+    if "position" in info:
+        return float(info["position"][0]), float(info["position"][1])
+    return (float(info["distance"]), float(info["drift"])) if "distance" in info else None
+
+
+def evaluate(
+    evaluation: Evaluation,
+    *,
+    out: Path | None = None,
+    workers: int = 1,
+    fresh: bool = False,
+    progress: bool = True,
+) -> dict[str, Any]:
+    """Runs what is missing of the episodes, and sums up.
+
+    Args:
+        evaluation: What is evaluated.
+        out: Folder for ``episodes.jsonl``, ``summary.json`` and ``summary.md``; None to write
+            nothing.
+        workers: Processes; nothing depends on their number.
+        fresh: Whether to run again what the folder holds. Episodes of other settings, policies or
+            versions of packages are not taken; changes of the code are not seen.
+        progress: Whether to show a progress bar, where there is a terminal.
+
+    Returns:
+        ``settings``, ``key``, ``figures`` (see ``figures``), ``episodes`` by seed, ``versions``,
+        ``machine``.
+
+    Raises:
+        FileNotFoundError: If there is no such policy.
+        ValueError: If it is for another task, or ``workers`` is below 1.
+        KeyboardInterrupt: As it came; the episodes that were finished are kept.
+    """
+    if workers < 1:
+        raise ValueError(f"workers must be at least 1, got {workers}")
+    key = evaluation.key()
+    env = evaluation.make()
+    actor(evaluation.policy, env)  # before any process starts: a wrong name is said at once
+    env.close()
+    seeds = range(evaluation.seed, evaluation.seed + evaluation.episodes)
+    path = None if out is None else out / EPISODES
+    done = {} if path is None or fresh else kept(path, key)
+    if path is not None:
+        _begin(path, fresh, key)
+    missing = [seed for seed in seeds if seed not in done]
+    bar = tqdm(total=len(seeds), initial=len(seeds) - len(missing), unit="episode",
+               disable=None if progress else True)  # fmt: skip
+    with bar, _running(evaluation, missing, workers) as results:
+        for row in results:
+            done[row["seed"]] = row
+            if path is not None:
+                _append(path, {"key": key, **row})
+            bar.update()
+    rows = [done[seed] for seed in seeds]
+    summary = {
+        "settings": asdict(evaluation),
+        "key": key,
+        "figures": figures(rows),
+        "episodes": rows,
+        "versions": versions(),
+        "machine": machine(),
+    }
+    if out is not None:
+        text = json.dumps(summary, indent=2, ensure_ascii=False) + "\n"
+        write_whole(out / SUMMARY, text.encode())
+        write_whole(out / REPORT, (report(summary) + "\n").encode())
+    return summary
+
+
+@contextmanager
+def _running(
+    evaluation: Evaluation, seeds: Sequence[int], workers: int
+) -> Iterator[Iterator[dict[str, Any]]]:
+    """Episodes in the order in which they end, in this process or in others."""
+    if workers == 1 or len(seeds) < 2:
+        yield (run_episode(evaluation, seed) for seed in seeds)
+        return
+    context = multiprocessing.get_context("spawn")
+    pool = ProcessPoolExecutor(min(workers, len(seeds)), mp_context=context)
+    try:
+        waiting = [pool.submit(run_episode, evaluation, seed) for seed in seeds]
+        yield (future.result() for future in as_completed(waiting))
+    finally:
+        pool.shutdown(cancel_futures=True)
+
+
+def kept(path: Path, key: str) -> dict[int, dict[str, Any]]:
+    """Episodes in a file that have ``key``, by seed; a line that was cut off is skipped."""
+    found = {}
+    for line in path.read_text(encoding="utf-8").splitlines() if path.exists() else ():
+        try:
+            row = json.loads(line)
+        except ValueError:
+            continue
+        if row.pop("key", None) == key:
+            found[row["seed"]] = row
+    return found
+
+
+def _begin(path: Path, fresh: bool, key: str) -> None:
+    """Ends a line that was cut off; without the episodes of ``key`` if they are to be run again."""
+    lines = path.read_text(encoding="utf-8").splitlines() if path.exists() else []
+    if fresh:
+        lines = [line for line in lines if f'"key": "{key}"' not in line]
+    write_whole(path, "".join(line + "\n" for line in lines).encode())
+
+
+def _append(path: Path, row: dict[str, Any]) -> None:
+    with path.open("a", encoding="utf-8") as file:
+        file.write(json.dumps(row, ensure_ascii=False) + "\n")
+        file.flush()
+        os.fsync(file.fileno())
+
+
+def figures(rows: Sequence[dict[str, Any]]) -> dict[str, dict[str, float | None]]:
+    """Means over episodes, with 95 % intervals, of the ``METRICS`` that the rows have.
+
+    Each has ``mean``, ``low`` and ``high`` (the interval, None where there is none), ``least`` and
+    ``most``. Intervals are Student's t, Wilson's for ``success``. Energy per metre and cost of
+    transport E/(m g d) are ratios of sums over episodes, with percentiles of 10 000 bootstrap
+    resamples of the episodes; they are None if the robot did not get on.
+    """
+    found: dict[str, dict[str, float | None]] = {}
+    for name in METRICS:
+        if name in _RATIOS and "distance" in rows[0]:
+            distance = np.array([row["distance"] for row in rows])
+            if name == "cost_of_transport":
+                distance = distance * [row["weight"] for row in rows]
+            found[name] = _ratio(np.array([row["energy"] for row in rows]), distance)
+        elif name in rows[0]:
+            values = np.array([float(row[name]) for row in rows])
+            low, high = (_share if name == "success" else _t)(values)
+            found[name] = {
+                "mean": float(values.mean()), "low": low, "high": high,
+                "least": float(values.min()), "most": float(values.max()),
+            }  # fmt: skip
+    return found
+
+
+def _t(values: NDArray[np.float64]) -> tuple[float | None, float | None]:
+    if len(values) < 2:
+        return None, None
+    from scipy import stats  # loaded late: it takes a second
+
+    half = float(stats.t.ppf(0.5 + _LEVEL / 2.0, len(values) - 1) * stats.sem(values))
+    return float(values.mean()) - half, float(values.mean()) + half
+
+
+def _share(values: NDArray[np.float64]) -> tuple[float | None, float | None]:
+    from scipy import stats
+
+    test = stats.binomtest(round(float(values.sum())), len(values))
+    interval = test.proportion_ci(_LEVEL, method="wilson")
+    return float(interval.low), float(interval.high)
+
+
+def _ratio(above: NDArray[np.float64], below: NDArray[np.float64]) -> dict[str, float | None]:
+    """Ratio of the sums; its extremes are those of single episodes."""
+    nothing: dict[str, float | None] = dict.fromkeys(("mean", "low", "high", "least", "most"))
+    if below.sum() <= 0.0:
+        return nothing
+    mean = float(above.sum() / below.sum())
+    if (below <= 0.0).any():
+        return {**nothing, "mean": mean}
+    each = above / below
+    drawn = np.random.default_rng(0).integers(len(above), size=(_RESAMPLES, len(above)))
+    tail = 100.0 * (1.0 - _LEVEL) / 2.0
+    low, high = np.percentile(above[drawn].sum(axis=1) / below[drawn].sum(axis=1),
+                              [tail, 100.0 - tail])  # fmt: skip
+    interval = {} if len(above) < 2 else {"low": float(low), "high": float(high)}
+    extremes = {"least": float(each.min()), "most": float(each.max())}
+    return {**nothing, "mean": mean, **interval, **extremes}
+
+
+def cell(name: str, figure: dict[str, float | None], *, interval: bool = True) -> str:
+    """A figure in its unit: mean, and the interval in brackets."""
+    _, factor, digits = METRICS[name]
+
+    def number(value: float | None) -> str:
+        return "" if value is None else f"{factor * value:.{digits}f}"
+
+    text = number(figure["mean"])
+    if interval and figure["low"] is not None:
+        text += f" ({number(figure['low'])} to {number(figure['high'])})"
+    return text
+
+
+def report(summary: dict[str, Any]) -> str:
+    """A summary as Markdown."""
+    settings, rows = summary["settings"], summary["episodes"]
+    lines = [
+        f"{settings['policy']} in {settings['task']}, {len(rows)} episodes: mean, 95 % interval"
+        " (Student's t; success: Wilson; energy per metre and cost of transport: bootstrap)",
+        "",
+        "| figure | mean | 95 % interval | least | most |",
+        "|---|---|---|---|---|",
+    ]
+    for name, figure in summary["figures"].items():
+        unit, factor, digits = METRICS[name]
+        values = [figure[key] for key in ("mean", "low", "high", "least", "most")]
+        cells = ["" if value is None else f"{factor * value:.{digits}f}" for value in values]
+        between = f"{cells[1]} to {cells[2]}" if cells[1] else ""
+        label = name.replace("_", " ") + (f" [{unit}]" if unit else "")
+        lines.append(f"| {label} | {cells[0]} | {between} | {cells[3]} | {cells[4]} |")
+    return "\n".join(lines + ["", *endings(rows)])
+
+
+def endings(rows: Iterable[dict[str, Any]]) -> list[str]:
+    """How the episodes ended, as Markdown."""
+    counts: dict[str, int] = {}
+    for row in rows:
+        counts[row["ending"]] = counts.get(row["ending"], 0) + 1
+    return [f"* {count} x {ending}" for ending, count in sorted(counts.items())]
