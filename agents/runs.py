@@ -67,15 +67,9 @@ class RunFolder:
         file = self.path / STATE
         return pickle.loads(file.read_bytes()) if file.is_file() else None
 
-    def save(self, state: Any, curves: Mapping[str, Sequence[Row]]) -> None:
-        """Replaces the state, then the curves.
-
-        Args:
-            state: What ``load`` gives back.
-            curves: Rows of each CSV file, by its name.
-        """
+    def save(self, state: Any) -> None:
+        """Replaces the state by what ``load`` is to give back."""
         write_whole(self.path / STATE, pickle.dumps(state, protocol=pickle.HIGHEST_PROTOCOL))
-        self.write_curves(curves)
 
     def write_curves(self, curves: Mapping[str, Sequence[Row]]) -> None:
         """Writes CSV files, whose columns are all keys in the order in which they come up."""

@@ -342,7 +342,8 @@ class _Search:
 
     def save(self) -> None:
         """Writes the state, then what follows from it."""
-        self.folder.save((self.state, self.known), {CURVE: self.state.rows})
+        self.folder.save((self.state, self.known))
+        self.folder.write_curves({CURVE: self.state.rows})
         self.policy(best=True).save(self.folder.path / BEST)
         self.policy(best=False).save(self.folder.path / LAST)
 

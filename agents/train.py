@@ -80,6 +80,8 @@ def train(
             disable=None if progress else True,
         )  # fmt: skip
         with closing(bar), closing(run):
+            if not run.new:
+                run.explain()  # the state may be newer, if the run was killed in between
             left = config.steps - run.model.num_timesteps
             if left > 0:
                 # No log of its own, which would empty what the curve takes from the logger.
@@ -207,7 +209,12 @@ class Run:
             "evaluations": self.evaluations,
             "best": self.best,
         }
-        self.folder.save(state, {CURVE: self.rows, EVALUATIONS: self.evaluations})
+        self.folder.save(state)
+        self.explain()
+
+    def explain(self) -> None:
+        """Writes what follows from the state: curves and policies."""
+        self.folder.write_curves({CURVE: self.rows, EVALUATIONS: self.evaluations})
         self.policy().save(self.folder.path / f"{LAST}.npz")
         if self.best is not None:
             self.best[1].save(self.folder.path / f"{BEST}.npz")
