@@ -93,6 +93,14 @@ class TaskVector(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[Any
         self._elapsed = np.full(num_envs, -1)  # steps of the episode, -1 before the first one
         self._over = np.zeros(num_envs, dtype=bool)
 
+    @property
+    def batch(self) -> SimulationBatch:
+        """What steps the simulations; its threads start when it is first asked for."""
+        if self._batch is None:
+            sims = [env.sim for env in self.envs]
+            self._batch = SimulationBatch(sims, threads=self.num_threads)
+        return self._batch
+
     def restart(
         self, i: int, *, seed: int | None = None, options: Options = None
     ) -> tuple[Observation, dict[str, Any]]:
@@ -125,14 +133,12 @@ class TaskVector(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[Any
         stepped = np.ones(self.num_envs, dtype=bool) if which is None else which
         if (self._elapsed[stepped] < 0).any():
             raise ResetNeeded("the tasks must be reset before the first step")
-        if self._batch is None:
-            sims = [env.sim for env in self.envs]
-            self._batch = SimulationBatch(sims, threads=self.num_threads)
+        batch = self.batch
         drives = [
             env.begin(command) if go else None
             for env, command, go in zip(self.envs, commands, stepped, strict=True)
         ]
-        errors = self._batch.step(drives, self.envs[0].control_period)
+        errors = batch.step(drives, self.envs[0].control_period)
         outcomes: list[Outcome | None] = []
         for i, (env, drive, error) in enumerate(zip(self.envs, drives, errors, strict=True)):
             if drive is None:
@@ -201,18 +207,42 @@ class TaskVector(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[Any
         outcomes = self.advance(actions, going)
         rewards = np.zeros(self.num_envs)
         terminated, truncated = np.zeros((2, self.num_envs), dtype=bool)
-        infos: dict[str, Any] = {}
+        ended: dict[str, Any] = {}
+        each = []
         for i, outcome in enumerate(outcomes):
             if outcome is None:  # its episode was over before this step
                 observation, info = self.restart(i)
             else:
                 observation, rewards[i], terminated[i], truncated[i], info = outcome
                 if self._over[i] and mode is AutoresetMode.SAME_STEP:
-                    infos = self._add_info(infos, {"final_obs": observation, "final_info": info}, i)
+                    ended = self._add_info(ended, {"final_obs": observation, "final_info": info}, i)
                     observation, info = self.restart(i)
             self._observations[i] = observation
-            infos = self._add_info(infos, info, i)
+            each.append(info)
+        infos = ended | self._gathered(each)
         return self._observations.copy(), rewards, terminated, truncated, infos
+
+    def _gathered(self, infos: Sequence[dict[str, Any]]) -> dict[str, Any]:
+        """What ``_add_info`` makes of the infos of all tasks; at once where they have like keys."""
+        gathered: dict[str, Any] = {}
+        if any(info.keys() != infos[0].keys() for info in infos):
+            for i, info in enumerate(infos):
+                gathered = self._add_info(gathered, info, i)
+            return gathered
+        for key, first in infos[0].items():
+            values: list[Any] = [info[key] for info in infos]
+            if isinstance(first, dict):
+                array: Any = self._gathered(values)
+            elif type(first) in (bool, int, float) or isinstance(first, np.number):
+                array = np.array(values, dtype=type(first))
+            elif isinstance(first, np.ndarray):
+                array = np.array(values, dtype=first.dtype)
+            else:
+                array = np.full(self.num_envs, None, dtype=object)
+                for i, value in enumerate(values):
+                    array[i] = value
+            gathered[key], gathered[f"_{key}"] = array, np.ones(self.num_envs, dtype=bool)
+        return gathered
 
     def _each(self, name: str, values: Any) -> list[Any]:
         """One value for each task."""

@@ -40,6 +40,7 @@ class SimulationBatch:
     Attributes:
         sims: The simulations.
         threads: Threads on which MuJoCo runs; the result does not depend on it.
+        physics: MuJoCo's batch, which has a model and a state for each of them.
     """
 
     def __init__(self, sims: Sequence[Simulation], *, threads: int = 1) -> None:
@@ -62,13 +63,13 @@ class SimulationBatch:
             raise ValueError(f"sims must be built alike, number {other[0]} is not as the first")
         self.threads = threads
         models = [sim.model for sim in self.sims]
-        self._batch = mujoco.batch.Batch(
+        self.physics = mujoco.batch.Batch(
             first.model, len(self.sims), min(threads, len(self.sims)), persistent=True
         )
-        self._batch.set_models(models)
+        self.physics.set_models(models)
         self._models = models
         self._tendon_length, self._tendon_slope = (
-            self._batch.bind(name) for name in ("ten_length", "ten_J")
+            self.physics.bind(name) for name in ("ten_length", "ten_J")
         )
         self._body = SmoothBody.batch([sim.body for sim in self.sims])
 
@@ -118,7 +119,7 @@ class SimulationBatch:
         Returns:
             Those for which it is not the right one, and which are as they were before.
         """
-        sims, batch = [self.sims[i] for i in ids], self._batch
+        sims, batch = [self.sims[i] for i in ids], self.physics
         every = _Every(self._body, sims, inputs)
         which = None if len(ids) == len(self.sims) else ids
         rows: Any = slice(None) if which is None else ids

@@ -252,7 +252,7 @@ def _heating(sim: Simulation) -> NDArray[np.float64]:
     return power
 
 
-class _Stopwatch:
+class Stopwatch:
     """Adds up the time spent in one function of an object; a context manager."""
 
     def __init__(self, owner: Any, name: str) -> None:
@@ -300,7 +300,7 @@ def _episode(task: ArmPickPlace, steps: int, tick: Callable[[], object]) -> dict
         action = policy.act(observation)
         mujoco.mj_getState(model, task.data, state, _STATE)
         alone = bare() if k % 2 else 0.0
-        with _Stopwatch(mujoco, "mj_step") as inside, _Stopwatch(task.sim, "step") as coupled:
+        with Stopwatch(mujoco, "mj_step") as inside, Stopwatch(task.sim, "step") as coupled:
             start = time.thread_time()
             observation, _, terminated, truncated, _ = task.step(action)
             taken = time.thread_time() - start

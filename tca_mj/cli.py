@@ -268,7 +268,12 @@ def _parser() -> argparse.ArgumentParser:
     train.set_defaults(run=_train)
 
     bench = commands.add_parser("bench", help="measure the speed on this machine")
-    bench.add_argument("--out", type=_folder, help="folder for benchmark.json and benchmark.md")
+    bench.add_argument(
+        "part", nargs="?", choices=["single", "vector"],
+        help="single: TCAs, arm and recordings, a minute; vector: many tasks at once and training,"
+        " some minutes; default: both",
+    )
+    bench.add_argument("--out", type=_folder, help="folder for the results, JSON and Markdown")
     bench.add_argument("--quick", action="store_true", help="a tenth of the measurements")
     bench.set_defaults(run=_bench)
 
@@ -510,11 +515,18 @@ def _command(arguments: argparse.Namespace) -> str:
 
 
 def _bench(arguments: argparse.Namespace) -> int:
-    from tca_mj.bench import benchmark, report
+    from tca_mj import bench, bench_vector
 
-    print(report(benchmark(scale=0.1 if arguments.quick else 1.0, out=arguments.out)))
-    if arguments.out:
-        print(f"\n{arguments.out / 'benchmark.md'}\n{arguments.out / 'benchmark.json'}")
+    scale, written = 0.1 if arguments.quick else 1.0, []
+    if arguments.part != "vector":
+        print(bench.report(bench.benchmark(scale=scale, out=arguments.out)), flush=True)
+        written.append("benchmark")
+    if arguments.part != "single":
+        print("\n" if written else "", end="")
+        print(bench_vector.report(bench_vector.benchmark(scale=scale, out=arguments.out)))
+        written.append("vector")
+    for name in written if arguments.out else []:
+        print(f"\n{arguments.out / f'{name}.md'}\n{arguments.out / f'{name}.json'}")
     return 0
 
 

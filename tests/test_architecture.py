@@ -27,6 +27,7 @@ LAYER_OF = {
     "registry": "door",
     "machine": "door",
     "bench": "agents",
+    "bench_vector": "agents",
     "validation": "agents",
     "certify": "agents",
     "plots": "control",

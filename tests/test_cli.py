@@ -11,7 +11,7 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
-from tca_mj import bench, cli, registry
+from tca_mj import bench, bench_vector, cli, registry
 from tca_mj.agents import demo
 from tca_mj.envs.arm import OBJECTS, ArmPickPlace
 from tca_mj.envs.viewer import NoDisplay, ViewerEnvironment, need_display
@@ -178,7 +178,7 @@ def test_the_benchmark_writes_what_it_prints(
     """Of its figures, only that they exist: how fast a machine is is no test."""
     plain = bench.benchmark
     monkeypatch.setattr(bench, "benchmark", lambda **kw: plain(**(kw | {"scale": 0.01})))
-    assert cli.main(["bench", "--quick", "--out", str(tmp_path)]) == 0
+    assert cli.main(["bench", "single", "--quick", "--out", str(tmp_path)]) == 0
     said = capsys.readouterr().out
     assert said.startswith((tmp_path / "benchmark.md").read_text(encoding="utf-8"))
     result = json.loads((tmp_path / "benchmark.json").read_text(encoding="utf-8"))
@@ -188,5 +188,26 @@ def test_the_benchmark_writes_what_it_prints(
     assert result["recording"]["share"] > 0.0
     assert result["bank"]["advance"] > 0.0
     assert min(result["tca"]["surface"], result["tca"]["rod"]) > 0.0
+    with pytest.raises(ValueError, match="scale"):
+        plain(scale=0.0)
+
+
+def test_the_benchmark_of_many_tasks_writes_what_it_prints(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    plain, id = bench_vector.benchmark, "TCA/MorphModule-v0"
+    few = {"scale": 0.01, "ids": [id], "num_envs": 2}
+    monkeypatch.setattr(bench_vector, "benchmark", lambda **kw: plain(**(kw | few)))
+    assert cli.main(["bench", "vector", "--out", str(tmp_path)]) == 0
+    said = capsys.readouterr().out
+    assert said.startswith((tmp_path / "vector.md").read_text(encoding="utf-8"))
+    result = json.loads((tmp_path / "vector.json").read_text(encoding="utf-8"))
+    row = result["tasks"][id]
+    assert row["physics_steps"] == 20
+    for way in (row["single"], *row["vector"].values()):
+        assert 0.0 < way["inside"] < way["cpu"]
+    assert row["single"]["bare"] > 0.0
+    assert set(row["vector"]) == {"1", "2"}
+    assert result["training"] or "training" in result["left_out"]
     with pytest.raises(ValueError, match="scale"):
         plain(scale=0.0)

@@ -1,7 +1,8 @@
 """Numbers from outside, real floats or a clear refusal; and dataclasses of arrays stacked."""
 
 from collections.abc import Sequence
-from dataclasses import fields, is_dataclass, replace
+from dataclasses import fields, is_dataclass
+from functools import cache
 from typing import Any, TypeVar, cast
 
 import numpy as np
@@ -44,17 +45,20 @@ def stacked(values: Sequence[Value]) -> Value:
     first: Any = values[0]
     if not is_dataclass(first):
         return cast(Value, np.stack(cast(Any, values)))
-    parts = {
-        field.name: stacked([getattr(value, field.name) for value in values])
-        for field in fields(first)
-    }
-    return cast(Value, replace(cast(Any, first), **parts))
+    kind: Any = type(first)
+    parts = {name: stacked([getattr(value, name) for value in values]) for name in _names(kind)}
+    return cast(Value, kind(**parts))
 
 
 def row(values: Value, i: int) -> Value:
-    """The ``i``-th of what ``stacked`` has made one."""
+    """The ``i``-th of what ``stacked`` has made one, of fields that need no names."""
     every: Any = values
     if not is_dataclass(every):
         return cast(Value, every[i])
-    parts = {field.name: row(getattr(every, field.name), i) for field in fields(every)}
-    return cast(Value, replace(cast(Any, every), **parts))
+    kind: Any = type(every)
+    return cast(Value, kind(*[row(getattr(every, name), i) for name in _names(kind)]))
+
+
+@cache
+def _names(kind: Any) -> tuple[str, ...]:
+    return tuple(field.name for field in fields(kind))
