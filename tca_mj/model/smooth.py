@@ -17,7 +17,6 @@ Nothing here is rounded by a matrix product, whose order of summation depends on
 in a batch has, bit for bit, what it has alone.
 """
 
-import math
 from collections.abc import Iterable, Sequence
 from copy import copy
 from dataclasses import dataclass
@@ -27,12 +26,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tca_mj.model.chain import MOTIONS, Chain, Motion
+from tca_mj.model.curves import Curves, rows, summed
 from tca_mj.model.tendon import Crossing, RoutedTca
 
 Array = NDArray[np.float64]
-
-# Gauss's rule along a cell, from 0 to 1: exact to 1e-8 for a quarter of a turn of a helix.
-_POINTS, _WEIGHTS = (np.polynomial.legendre.leggauss(4) + np.array([[1.0], [0.0]])) / 2.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -64,27 +61,6 @@ class Strained:
             self.motion[i], self.length[i], self.each[i], self.slope[i],
             self.sine[i], self.cosine[i], self.cotangent[i],
         )  # fmt: skip
-
-
-def summed(values: Array, place: NDArray[np.int64], size: int) -> Array:
-    """Adds up the last axis by place, in its order; shape (..., k) to (..., size).
-
-    Args:
-        values: What is added up, shape (..., k).
-        place: Where each goes, from 0 to size - 1, shape (k,).
-        size: Number of places.
-    """
-    lead = values.shape[:-1]
-    count = math.prod(lead)
-    if lead:
-        place = (place + size * np.arange(count)[:, None]).ravel()
-    total: Array = np.bincount(place, values.ravel(), count * size).astype(np.float64, copy=False)
-    return total.reshape(*lead, size) if lead else total
-
-
-def _rows(array: Array) -> tuple[Array, ...]:
-    """The rows of the last axis but one."""
-    return tuple(array[..., i, :] for i in range(array.shape[-2]))
 
 
 class SmoothBody:
@@ -120,7 +96,9 @@ class SmoothBody:
         self._tca = np.array([i for i, tca in enumerate(tcas) for _ in tca.crossings], np.int64)
         self._cell = np.array([number[tuple(c.joints.values())] for c in crossings], np.int64)
         self._read_cells(list(cells.values()))
-        self._read_curves(crossings, len(tcas))
+        self._curves, self._tcas = Curves(crossings, self._cell), len(tcas)
+        # Where the motions of each crossing's cell are, shape (4 crossings,).
+        self._cells = (np.arange(len(MOTIONS))[:, None] * self._shape[1] + self._cell).ravel()
         self._read_tendons([model.tendon(tca.name).id for tca in tcas])
         self._read_polylines(crossings)
         self.rest = self.at(model.qpos_spring).motion.copy()
@@ -163,22 +141,6 @@ class SmoothBody:
         self.damping.flat[self._where] = model.dof_damping[self._dof]
         self.stiffness.flat[self._where] = model.jnt_stiffness[self._joint]
 
-    def _read_curves(self, crossings: Sequence[Crossing], tcas: int) -> None:
-        """Offsets and their slopes at the points of each crossing, shape (points, 1, crossings)."""
-        count = len(crossings)
-        self._h = np.array([crossing.cell for crossing in crossings])
-        offset, slope = np.empty((2, count, len(_POINTS), 2))
-        for i, crossing in enumerate(crossings):
-            start, end = crossing.span
-            s = start + (end - start) * _POINTS
-            offset[i] = crossing.leg.offset(s)
-            slope[i] = crossing.leg.slope(s) * (end - start) / crossing.cell
-        self._x, self._y = np.ascontiguousarray(offset.T)[:, :, None]
-        self._dx, self._dy = np.ascontiguousarray(slope.T)[:, :, None]
-        # Where the motions of each crossing's cell are, shape (4 crossings,).
-        self._cells = (np.arange(len(MOTIONS))[:, None] * self._shape[1] + self._cell).ravel()
-        self._tcas = tcas
-
     def _read_tendons(self, tendons: Sequence[int]) -> None:
         """Where MuJoCo keeps the tendons' derivatives by the cells' joints, in a sparse matrix."""
         model, row = self._model, {int(dof): i for i, dof in enumerate(self._dof)}
@@ -202,21 +164,12 @@ class SmoothBody:
         for i, crossing in enumerate(crossings):
             for motion, curving in crossing.polyline.items():
                 polyline[i, MOTIONS.index(motion)] = curving
-        # d²|w| = (|dw|² - (dw·w/|w|)²)/|w| in the straight body, by the motions that bend it.
-        bends = [MOTIONS.index("bend_x"), MOTIONS.index("bend_y")]
-        per = 1.0 / self._h
-        norm = np.sqrt(self._dx**2 + self._dy**2 + 1.0)
-        more = np.zeros_like(polyline)
-        for bend, lever in zip(bends, (self._y * per, -self._x * per), strict=True):
-            curved = (lever**2 - (lever / norm) ** 2) / norm
-            more[:, bend] = np.sum(_WEIGHTS[:, None, None] * curved, axis=0)[0] * self._h
-            more[:, bend] -= polyline[:, bend]
-        length = np.sum(_WEIGHTS[:, None, None] * norm, axis=0)[0] * self._h
+        length, curved = self._curves.straight()
         self._twist = polyline[:, MOTIONS.index("twist")] * length
-
         total = np.zeros((*self._shape, self._tcas))
-        for i in bends:
-            np.add.at(total[i], (self._cell, self._tca), more[:, i])
+        bends = [MOTIONS.index("bend_x"), MOTIONS.index("bend_y")]
+        for bend, more in zip(bends, curved - polyline[:, bends].T, strict=True):
+            np.add.at(total[bend], (self._cell, self._tca), more)
         total = total[np.unravel_index(self._where, self._shape)]
         joint, tca = np.nonzero(total)
         self._more = joint, tca, total[joint, tca]
@@ -238,7 +191,7 @@ class SmoothBody:
         motion = motion.reshape(*lead, *self._shape)
         angles = self._half * motion[..., 1:, :]
         sine, cosine = np.sin(angles), np.cos(angles)
-        (sx, sy, sz), (cx, cy, cz) = _rows(sine), _rows(cosine)
+        (sx, sy, sz), (cx, cy, cz) = rows(sine), rows(cosine)
         ss, cc, sc, cs = sx * sy, cx * cy, sx * cy, cx * sy
         x, y, z = sc * cz + cs * sz, cs * cz - sc * sz, cc * sz + ss * cz
         real = cc * cz - ss * sz
@@ -246,9 +199,9 @@ class SmoothBody:
         imaginary = np.sqrt(x * x + y * y + z * z) + 1e-300
         ratio = np.arctan2(imaginary, real) / imaginary
         factor = self._twice * ratio
-        for row, vector in zip(_rows(motion)[1:], (x, y, z), strict=True):
+        for row, vector in zip(rows(motion)[1:], (x, y, z), strict=True):
             np.multiply(vector, factor, out=row)
-        each, slope = self._curves(motion)
+        each, slope = self._curves.lengths(motion)
         length = summed(each, self._tca, self._tcas)
         strained = Strained(motion, length, each, slope, sine, cosine, ratio * real)
         self._last = key, strained
@@ -257,29 +210,6 @@ class SmoothBody:
     def keep(self, qpos: Array, strained: Strained) -> None:
         """What ``at`` has to return for ``qpos``, computed elsewhere."""
         self._last = qpos.take(self._qpos, axis=-1).tobytes(), strained
-
-    def _curves(self, motion: Array) -> tuple[Array, Array]:
-        """Length of each crossing, (..., crossings), and its slopes, (..., 4, crossings)."""
-        lead = motion.shape[:-2]
-        strain = motion.reshape(-1, *self._shape).take(self._cell, axis=-1) / self._h
-        e, u1, u2, u3 = _rows(strain)
-        x, y = self._x, self._y
-        wx = self._dx - u3 * y
-        wy = self._dy + u3 * x
-        wz = 1.0 + e + u1 * y - u2 * x
-        norm = np.sqrt(wx * wx + wy * wy + wz * wz)
-        weight = _WEIGHTS[:, None, None]
-        each = self._h * np.add.reduce(weight * norm, axis=0)
-        share = weight / norm
-        wx *= share
-        wy *= share
-        wz *= share
-        slope = np.empty_like(strain)
-        np.add.reduce(wz, axis=0, out=slope[:, 0])
-        np.add.reduce(wz * y, axis=0, out=slope[:, 1])
-        np.add.reduce(wz * -x, axis=0, out=slope[:, 2])
-        np.add.reduce(wy * x - wx * y, axis=0, out=slope[:, 3])
-        return each.reshape(*lead, -1), slope.reshape(*lead, *slope.shape[1:])
 
     def springs(
         self, strained: Strained, tension: Array, slope: Array, qpos: Array
@@ -353,8 +283,8 @@ class SmoothBody:
         tension = tension.take(self._tca, axis=-1)
         twist = summed(time * tension * self._twist / strained.each, self._cell, self._shape[1])
         damping = self.damping.copy()
-        _, bend_x, bend_y, _ = _rows(strained.motion)
-        _, across_y, across_x, along = _rows(damping)
+        _, bend_x, bend_y, _ = rows(strained.motion)
+        _, across_y, across_x, along = rows(damping)
         across_y += 0.25 * bend_y**2 * twist
         across_x += 0.25 * bend_x**2 * twist
         along += twist
@@ -371,8 +301,8 @@ class SmoothBody:
 
     def _turn_to_hinges(self, load: Array, strained: Strained) -> None:
         """Turns the moments on the rotation vectors, rows 1 to 3, to moments about the hinges."""
-        tx, ty, tz = _rows(self._order * strained.motion[..., 1:, :])
-        row_x, row_y, row_z = _rows(load)[1:]
+        tx, ty, tz = rows(self._order * strained.motion[..., 1:, :])
+        row_x, row_y, row_z = rows(load)[1:]
         mx, my, mz = row_x.copy(), row_y.copy(), row_z.copy()
         # By the transposed derivative of the logarithm, m - t × m/2 + c t × (t × m).
         square = tx * tx + ty * ty + tz * tz
@@ -384,8 +314,8 @@ class SmoothBody:
         m2 = cotangent * mz + along * tz - 0.5 * (tx * my - ty * mx)
         # The axes of the outer hinges as the inner ones have turned them.
         half = strained.sine[..., 1:, :]
-        sy, sz = _rows(2.0 * half * strained.cosine[..., 1:, :])
-        cy, cz = _rows(1.0 - 2.0 * half**2)
+        sy, sz = rows(2.0 * half * strained.cosine[..., 1:, :])
+        cy, cz = rows(1.0 - 2.0 * half**2)
         np.add(cy * (cz * m0 - sz * m1), sy * m2, out=row_x)
         np.add(sz * m0, cz * m1, out=row_y)
         row_z[...] = m2

@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tca_mj.model.smooth import SmoothBody, summed
+from tca_mj.model.curves import summed
+from tca_mj.model.smooth import SmoothBody
 from tca_mj.model.spine import RoutedSpine
 from tca_mj.smp import DamageSpec, SpineBank, SpinesState, flag_damage, soft_bending_rate
 from tca_mj.tca.arrays import row, stacked
