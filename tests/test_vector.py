@@ -12,6 +12,7 @@ from gymnasium.vector import AutoresetMode, SyncVectorEnv
 
 from tca_mj.envs.vector import TaskVector
 from tca_mj.registry import TASKS
+from tca_mj.render import RenderingUnavailable
 
 IDS = [task.id for task in TASKS]
 QUICK = "TCA/MorphModule-v0"  # the task whose step takes a millisecond
@@ -215,3 +216,16 @@ def test_gymnasiums_wrappers_accept_it():
     assert truncated.all()
     assert infos["episode"]["r"] == pytest.approx(total)
     assert infos["episode"]["l"].tolist() == [4, 4]
+
+
+def test_a_picture_of_each():
+    envs = native(QUICK, 2, render_mode="rgb_array", size=(64, 48))
+    envs.reset(seed=0, options=[{"start": 0.0}, {"start": 3.0}])
+    try:
+        first, second = envs.render()
+    except RenderingUnavailable as reason:
+        pytest.skip(str(reason))
+    finally:
+        envs.close()
+    assert first.shape == second.shape == (48, 64, 3)
+    assert (first != second).any()
