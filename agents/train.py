@@ -42,6 +42,8 @@ EVALUATIONS = "evaluations.csv"
 BEST, LAST = "best", "last"  # with the ending of their kind
 RECORDING, VIDEO = "best.rrd", "best.mp4"
 
+_FILM = 10.0  # length of the film of an episode that takes all its time [s]
+
 _LEARNERS: dict[str, Any] = {"ppo": PPO, "sac": SAC, "td3": TD3}
 
 
@@ -232,8 +234,13 @@ class Run:
             task: Any = env.unwrapped
             frames: list[Callable[[], None]] = []
             if video:
+                steps = gym.spec(self.config.task).max_episode_steps or 1
+                limit = steps * task.control_period
                 try:
-                    film = Film(task.sim, folder / f"part-{VIDEO}", camera=task._camera, speed=8.0)
+                    film = Film(
+                        task.sim, folder / f"part-{VIDEO}", camera=task._camera,
+                        speed=max(1.0, limit / _FILM),
+                    )  # fmt: skip
                     ends.callback(film.close)
                     frames, made = [film.frame], [*made, VIDEO]
                 except ImportError as error:

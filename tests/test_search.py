@@ -226,7 +226,7 @@ def test_a_killed_search_goes_on_to_the_same_curve(tmp_path):
     out = tmp_path / "killed"
     command = [sys.executable, "-c", SCRIPT, repr(settings), str(out)]
     run = subprocess.Popen(command, start_new_session=True)
-    deadline = time.monotonic() + 60.0
+    deadline = time.monotonic() + 600.0  # only against hanging
     curve = out / "curve.csv"
     while not (curve.is_file() and b"\n1," in curve.read_bytes()):
         assert run.poll() is None and time.monotonic() < deadline
