@@ -116,7 +116,8 @@ def first_gait(task: str, start: str) -> tuple[Gait, tuple[float, ...]]:
 
     Args:
         task: One of ``TASKS``.
-        start: ``scripted``, ``trot``, or a policy's file or name.
+        start: ``scripted``; ``trot``, which is the same with diagonal legs together, half a cycle
+            after the others; or a policy's file or name.
 
     Raises:
         FileNotFoundError: If ``start`` is no policy.
@@ -124,7 +125,9 @@ def first_gait(task: str, start: str) -> tuple[Gait, tuple[float, ...]]:
     """
     name = TASKS[task]
     if start in ("scripted", "trot"):
-        gait = GAITS[name] if start == "scripted" else TROT
+        gait = GAITS[name]
+        if start == "trot":
+            gait = replace(gait, offset=TROT.offset)
         return gait, (STEERING[name],) * gait.legs
     saved = SavedPolicy.read(find(start))
     if saved.gait is None:
