@@ -9,10 +9,10 @@ import hashlib
 import json
 import multiprocessing
 import os
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -23,10 +23,10 @@ from tqdm import tqdm
 
 import tca_mj  # noqa: F401  (registers the tasks in a new process)
 from tca_mj.agents.actors import NAMES, actor, best_of
+from tca_mj.agents.design import designed, robot_of
 from tca_mj.agents.policy import find, write_whole
 from tca_mj.envs.base import how_it_ended
 from tca_mj.machine import machine, versions
-from tca_mj.modules.leg import LegSpec
 from tca_mj.registry import TASKS
 from tca_mj.robots.tetrapod import TetrapodSpec
 
@@ -50,10 +50,8 @@ METRICS = {
 _RATIOS = ("energy_per_metre", "cost_of_transport")
 _LEVEL, _RESAMPLES = 0.95, 10_000
 
-# A finer leg of the same mass: a leg has a plate at its root and behind each node.
-_FINE_LEG = LegSpec(
-    nodes=10, motions=("bend_x", "bend_y", "twist"), plate_fill=LegSpec().plate_fill * 6.0 / 11.0
-)
+# A finer leg. It has a plate at its root and behind each node, which together keep their mass.
+_FINE_LEG = {"leg.nodes": 10, "leg.motions": ("bend_x", "bend_y", "twist")}
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -71,6 +69,8 @@ class Evaluation:
         model: ``used``; or, for the tetrapod's gaits, ``legs`` (ten nodes a leg, which twist, of
             the same mass) or ``fine`` (those legs, and every spine a chain of its own).
         timestep: Physics time step [s]; None for the task's own.
+        design: Figures of the robot that differ from the default, see
+            ``tca_mj.agents.design.robot_of``.
 
     Raises:
         ValueError: If something is unknown or out of range.
@@ -84,6 +84,7 @@ class Evaluation:
     steps: int | None = None
     model: str = "used"
     timestep: float | None = None
+    design: Mapping[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         known = [task.id for task in TASKS]
@@ -97,6 +98,8 @@ class Evaluation:
             raise ValueError(f"randomise must be between 0 and 0.5, got {self.randomise}")
         if self.randomise and not self._options(self.randomise):
             raise ValueError(f"randomise must be 0, as {self.task} varies nothing")
+        if self.design:
+            robot_of(self.task, self.design)
         for name, value, least in (
             ("episodes", self.episodes, 1), ("seed", self.seed, 0), ("steps", self.steps, 1)
         ):  # fmt: skip
@@ -123,6 +126,8 @@ class Evaluation:
         """Tells apart what must not be mixed: settings, the policy's contents, versions."""
         settings = asdict(self)
         del settings["episodes"], settings["seed"]
+        if not self.design:
+            del settings["design"]
         if self.policy not in NAMES:
             settings["policy"] = hashlib.sha256(find(best_of(self.policy)).read_bytes()).hexdigest()
         text = json.dumps([settings, versions()], sort_keys=True)
@@ -135,9 +140,13 @@ class Evaluation:
             ValueError: If the time step does not fit.
         """
         more: dict[str, Any] = {} if self.timestep is None else {"timestep": self.timestep}
+        design = dict(self.design)
         if self.model != "used":
             more["fine"] = self.model == "fine"
-            more["robot"] = TetrapodSpec(leg=_FINE_LEG, nodes=6 if more["fine"] else 4)
+            leg = designed(TetrapodSpec(), design).leg
+            design |= _FINE_LEG | ({"nodes": 6} if more["fine"] else {})
+            design["leg.plate_fill"] = leg.plate_fill * (leg.nodes + 1) / 11.0
+        more |= robot_of(self.task, design) if design else {}
         return gym.make(self.task, max_episode_steps=self.steps, **more)
 
 
@@ -373,7 +382,7 @@ def cell(name: str, figure: dict[str, float | None], *, interval: bool = True) -
     _, factor, digits = METRICS[name]
 
     def number(value: float | None) -> str:
-        return "" if value is None else f"{factor * value:.{digits}f}"
+        return "" if value is None else f"{round(factor * value, digits) + 0.0:.{digits}f}"
 
     text = number(figure["mean"])
     if interval and figure["low"] is not None:

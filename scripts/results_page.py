@@ -1,0 +1,173 @@
+"""Evaluates every agent in every task and writes docs/results.md, with its data and its pictures.
+
+    python scripts/results_page.py                            what is missing, then the page
+    python scripts/results_page.py --tasks TCA/BendReach-v0   of one task; the page of all there is
+    python scripts/results_page.py --page                     the page alone, of what is there
+
+Finished episodes are kept in runs/results; a second run goes on where the first one stopped.
+``docs/results.json`` holds the figures of the page, which tests compare with. Learning curves are
+those that come with the policies, ``agents/policies/NAME.csv``.
+"""
+
+import argparse
+import csv
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from tca_mj.agents.evaluate import EPISODES, METRICS, Evaluation, cell, evaluate, figures, kept
+from tca_mj.agents.policy import SavedPolicy, shipped
+from tca_mj.registry import TASKS
+
+ROOT = Path(__file__).resolve().parent.parent
+PAGE, DATA = ROOT / "docs" / "results.md", ROOT / "docs" / "results.json"
+PICTURES = ROOT / "docs" / "pictures"
+COURSE = "TCA/TetrapodCourse-v0"
+
+# The robot, and what it is called on the page. Chance and nobody act on the first alone.
+CONDITIONS: dict[str, dict[str, Any]] = {
+    "nominal": {"episodes": 5},
+    "± 20 %": {"episodes": 5, "randomise": 0.2},
+    "legs twist": {"episodes": 2, "model": "legs"},
+    "finer": {"episodes": 1, "model": "fine"},
+}
+SHOWN = {
+    "gait": ("speed", "drift", "success", "energy_per_metre", "cost_of_transport",
+             "peak_temperature", "peak_tension", "return"),
+    "goal": ("success", "duration", "energy", "peak_temperature", "peak_tension", "return"),
+}  # fmt: skip
+CURVES = ("validation_speed_m_per_s", "success_mean", "validation_score", "return_mean")
+
+
+INTRODUCTION = """\
+# Results
+
+How good the scripted and learned policies are, against chance and doing nothing. This page is
+written by one command, which goes on where it was interrupted:
+
+```sh
+python scripts/results_page.py
+```
+
+Means over episodes of the tasks' own length with seeds 0, 1, ...; in brackets the 95 % interval of
+the first two figures (of means: Student's t over episodes; of success: Wilson's; a single episode
+has none). Energy per metre and cost of transport E/(m g d) are ratios of sums. Success of a gait is
+to come to the end of its time; drift is its size.
+
+* ± 20 %: friction, mass, TCA gain and heat loss are drawn within 20 %, the surroundings within 5 K
+  of 25 °C.
+* legs twist: legs of ten nodes instead of five, which also twist, of the same mass.
+* finer: these legs, and every spine a chain of its own that bends about both axes, twists and
+  stretches ([the model that certifies the one in use](tetrapod-model.md)), at the same time step.
+
+One's own policy is measured by `tca-mj eval POLICY --task TASK`, with `--randomise`, `--model` and
+`--timestep`; `tca-mj demo --policy POLICY --task TASK` films it.
+"""
+
+
+def cases(tasks: list[str]) -> Iterator[tuple[str, str, str, Evaluation]]:
+    """Task, policy and condition, with what is to be run."""
+    for task in tasks:
+        gait = any(known.id == task and "gait" in known.kwargs for known in TASKS)
+        learned = [name for name, path in shipped().items() if SavedPolicy.read(path).task == task]
+        for policy in ("scripted", *learned, "random", "off"):
+            for condition, settings in CONDITIONS.items():
+                acts = policy not in ("random", "off")
+                if (not acts and condition != "nominal") or (task == COURSE and not acts):
+                    continue
+                if not gait and "model" in settings:
+                    continue
+                if "MorphModule" in task or "ArmPickPlace" in task:  # nothing varies them
+                    if "randomise" in settings:
+                        continue
+                more = dict(settings)
+                if task == COURSE:
+                    more["episodes"] = 1
+                yield task, policy, condition, Evaluation(task=task, policy=policy, **more)
+
+
+def table(task: str, found: dict[str, dict[str, Any]]) -> list[str]:
+    """The table of a task, as Markdown."""
+    first = next(iter(next(iter(found.values())).values()))
+    names = SHOWN["gait" if "speed" in first["figures"] else "goal"]
+    heads = [name.replace("_", " ") + (f" [{METRICS[name][0]}]" if METRICS[name][0] else "")
+             for name in names]  # fmt: skip
+    lines = [f"| agent | robot | episodes | {' | '.join(heads)} |", "|---" * (3 + len(names)) + "|"]
+    for policy, conditions in found.items():
+        for condition, entry in conditions.items():
+            shown = [cell(name, entry["figures"][name], interval=name in names[:2])
+                     if name in entry["figures"] else "" for name in names]  # fmt: skip
+            lines.append(f"| {policy} | {condition} | {entry['episodes']} | {' | '.join(shown)} |")
+    return lines
+
+
+def curves() -> list[str]:
+    """Draws the learning curves that come with the policies; returns the lines that show them."""
+    lines = []
+    for name, path in shipped().items():
+        file = path.with_suffix(".csv")
+        if not file.is_file():
+            continue
+        with file.open(encoding="utf-8", newline="") as text:
+            rows = list(csv.DictReader(text))
+        what = next((key for key in CURVES if rows and any(row.get(key) for row in rows)), None)
+        if what is None:
+            continue
+        points = [(float(row["steps"]), float(row[what])) for row in rows if row.get(what)]
+        picture = PICTURES / f"curve_{name}.png"
+        draw(picture, points, name, what.replace("_", " "))
+        lines += [f"![{name}: {what} over steps](pictures/{picture.name})", ""]
+    return lines
+
+
+def draw(path: Path, points: list[tuple[float, float]], title: str, what: str) -> None:
+    """One learning curve."""
+    import matplotlib.pyplot as plt
+
+    figure, axes = plt.subplots(figsize=(6.0, 2.6), layout="constrained")
+    axes.plot(*zip(*points, strict=True), marker=".", color="tab:blue")
+    axes.set(xlabel="steps of the task", ylabel=what, title=title)
+    axes.grid(alpha=0.3)
+    figure.savefig(path, dpi=110)
+    plt.close(figure)
+
+
+def page(results: dict[str, dict[str, dict[str, Any]]]) -> str:
+    """The whole page."""
+    lines = [INTRODUCTION]
+    for task, found in results.items():
+        lines += [f"## `{task}`", "", *table(task, found), ""]
+    drawn = curves()
+    if drawn:
+        lines += ["## Learning curves", "", *drawn]
+    return "\n".join(lines)
+
+
+def main(argv: list[str] | None = None) -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    known = [task.id for task in TASKS]
+    parser.add_argument("--tasks", nargs="+", choices=known, default=known, metavar="TASK")
+    parser.add_argument("--workers", type=int, default=1)
+    parser.add_argument("--page", action="store_true", help="run nothing")
+    parser.add_argument("--out", type=Path, default=ROOT / "runs" / "results")
+    arguments = parser.parse_args(argv)
+    results: dict[str, dict[str, dict[str, Any]]] = {}
+    for task, policy, condition, evaluation in cases(known):
+        folder = arguments.out / task.partition("/")[2] / policy
+        if task in arguments.tasks and not arguments.page:
+            print(f"{task}: {policy}, {condition}", flush=True)
+            evaluate(evaluation, out=folder, workers=arguments.workers)
+        rows = kept(folder / EPISODES, evaluation.key())
+        if len(rows) < evaluation.episodes:
+            continue  # not run yet
+        seeds = range(evaluation.seed, evaluation.seed + evaluation.episodes)
+        entry = {"episodes": evaluation.episodes, "figures": figures([rows[s] for s in seeds])}
+        results.setdefault(task, {}).setdefault(policy, {})[condition] = entry
+    DATA.write_text(json.dumps(results, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+    PAGE.write_text(page(results), encoding="utf-8")
+    print(f"{PAGE}\n{DATA}")
+
+
+if __name__ == "__main__":
+    main()
