@@ -37,7 +37,11 @@ SHOWN = {
              "peak_temperature", "peak_tension", "return"),
     "goal": ("success", "duration", "energy", "peak_temperature", "peak_tension", "return"),
 }  # fmt: skip
-CURVES = ("validation_speed_m_per_s", "success_mean", "validation_score", "return_mean")
+# What is drawn of a learning curve, the first of these that it has: columns and what they are.
+CURVES = (
+    (("speed_mean_m_per_s", "validation_speed_m_per_s"), "speed [m/s]"),
+    (("return_mean",), "return"),
+)
 
 
 INTRODUCTION = """\
@@ -111,22 +115,29 @@ def curves() -> list[str]:
             continue
         with file.open(encoding="utf-8", newline="") as text:
             rows = list(csv.DictReader(text))
-        what = next((key for key in CURVES if rows and any(row.get(key) for row in rows)), None)
-        if what is None:
-            continue
-        points = [(float(row["steps"]), float(row[what])) for row in rows if row.get(what)]
+        keys, what = next(each for each in CURVES if each[0][0] in rows[0])
+        columns = {
+            key: [(float(row["steps"]), float(row[key])) for row in rows if row.get(key)]
+            for key in keys
+        }
         picture = PICTURES / f"curve_{name}.png"
-        draw(picture, points, name, what.replace("_", " "))
-        lines += [f"![{name}: {what} over steps](pictures/{picture.name})", ""]
+        draw(picture, columns, name, what)
+        lines += [f"![{name}: {what} over steps of the task](pictures/{picture.name})", ""]
     return lines
 
 
-def draw(path: Path, points: list[tuple[float, float]], title: str, what: str) -> None:
+def draw(
+    path: Path, columns: dict[str, list[tuple[float, float]]], title: str, what: str
+) -> None:
     """One learning curve."""
     import matplotlib.pyplot as plt
 
     figure, axes = plt.subplots(figsize=(6.0, 2.6), layout="constrained")
-    axes.plot(*zip(*points, strict=True), marker=".", color="tab:blue")
+    for name, points in columns.items():
+        if points:
+            label = name.removesuffix("_m_per_s").replace("_", " ")
+            axes.plot(*zip(*points, strict=True), marker=".", label=label)
+    axes.legend(frameon=False)
     axes.set(xlabel="steps of the task", ylabel=what, title=title)
     axes.grid(alpha=0.3)
     figure.savefig(path, dpi=110)
