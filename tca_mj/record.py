@@ -14,6 +14,7 @@ Entities:
   by kind. The geoms of MuJoCo's own world body are ``/world/scene``.
 * ``/world/tca/<name>``: path of a TCA.
 * ``/actuators/<name>/{power,temperature,tension,length,resistance}``: W, °C, N, m, ohm.
+* ``/heaters/<name>/{voltage,temperature}`` of the shape-memory spines, if there are any: V, °C.
 * ``/reward/<term>`` and ``/events``.
 """
 
@@ -39,6 +40,8 @@ QUANTITIES = {
     "resistance": "Resistance [Ω]",
 }
 
+HEATER_QUANTITIES = {"voltage": "Spine heaters [V]", "temperature": "Spines [°C]"}
+
 _LIGHTNESS = 0.75  # of the curves, on Rerun's dark ground
 _LEGEND = 8  # curves whose names still fit beside a plot; the others show theirs when pointed at
 _BACKGROUND = (226, 230, 236)
@@ -54,7 +57,8 @@ _TEXT = rerun.TextLog.descriptor_text()
 class Recorded(Protocol):
     """What is recorded of a simulation; ``tca_mj.sim.Simulation`` has it.
 
-    The properties are float64 of shape (n,), one entry per TCA.
+    The properties are float64 of shape (n,), one entry per TCA. Shape-memory spines are recorded
+    too where there are some: an attribute ``spines`` as ``Simulation`` has it.
     """
 
     @property
@@ -143,6 +147,10 @@ class Recorder:
         self._position = np.zeros((self._bodies.size, chunk, 3), dtype=np.float32)
         self._quaternion = np.zeros((self._bodies.size, chunk, 4), dtype=np.float32)
         self._curves = np.zeros((len(QUANTITIES), n, chunk))
+        spines = getattr(simulation, "spines", None)
+        self._spines = spines if spines is not None and spines.n else None
+        self._heaters: tuple[str, ...] = () if self._spines is None else self._spines.names
+        self._heat = np.zeros((len(HEATER_QUANTITIES), len(self._heaters), chunk))
         empty = np.zeros((0, 3), dtype=np.float32)
         self._strips = [[empty] * chunk for _ in range(n)]
         self._rewards: dict[str, tuple[list[int], list[float]]] = {}
@@ -154,7 +162,8 @@ class Recorder:
         self._stream.save(self.path, write_footer=footer)
         centre, size = extent(model, simulation.data)
         ground = ground_height(model)
-        self._stream.send_blueprint(_blueprint(simulation.tca_names, centre, size, ground))
+        blueprint = _blueprint(simulation.tca_names, self._heaters, centre, size, ground)
+        self._stream.send_blueprint(blueprint)
         for entity, content in self._static(paths, moving, tca_radius, size):
             self._stream.log(entity, content, static=True, strict=True)
         self._stream.flush()
@@ -183,6 +192,9 @@ class Recorder:
         self._quaternion[:, i] = data.xquat[self._bodies]
         for row, quantity in enumerate(QUANTITIES):
             self._curves[row, :, i] = getattr(simulation, quantity)
+        if self._spines is not None:
+            for row, quantity in enumerate(HEATER_QUANTITIES):
+                self._heat[row, :, i] = getattr(self._spines, quantity)
         points = data.wrap_xpos.reshape(-1, 3)
         starts = data.ten_wrapadr[simulation.tendon].tolist()
         counts = data.ten_wrapnum[simulation.tendon].tolist()
@@ -266,6 +278,10 @@ class Recorder:
                 lines = rerun.components.LineStrip3DBatch(np.array(strips) if even else strips)
                 shades = rerun.components.ColorBatch(colours[j])
                 self._send(_line(name), times, (_STRIP, lines, ones), (_COLOUR, shades, ones))
+            for j, name in enumerate(self._heaters):
+                for row, quantity in enumerate(HEATER_QUANTITIES):
+                    values = rerun.components.ScalarBatch(self._heat[row, j, :k])
+                    self._send(_heater(name, quantity), times, (_SCALAR, values, ones))
         for term, (frames, amounts) in self._rewards.items():
             path = f"/reward/{rerun.escape_entity_path_part(term)}"
             if term not in self._reward_names:
@@ -316,6 +332,11 @@ class Recorder:
             for quantity in QUANTITIES:
                 style = rerun.SeriesLines(colors=rgba_bytes(colour), names=name, widths=1.5)
                 yield _curve(name, quantity), style
+        colours = series_colours(len(self._heaters), lightness=_LIGHTNESS)
+        for name, colour in zip(self._heaters, colours, strict=True):
+            for quantity in HEATER_QUANTITIES:
+                style = rerun.SeriesLines(colors=rgba_bytes(colour), names=name, widths=1.5)
+                yield _heater(name, quantity), style
 
 
 def _packed(colour: NDArray[np.float64]) -> NDArray[np.uint32]:
@@ -341,12 +362,20 @@ def _curve(name: str, quantity: str) -> str:
     return f"/actuators/{rerun.escape_entity_path_part(name)}/{quantity}"
 
 
+def _heater(name: str, quantity: str) -> str:
+    return f"/heaters/{rerun.escape_entity_path_part(name)}/{quantity}"
+
+
 def _line(name: str) -> str:
     return f"/world/tca/{rerun.escape_entity_path_part(name)}"
 
 
 def _blueprint(
-    names: tuple[str, ...], centre: NDArray[np.float64], size: float, ground: float | None
+    names: tuple[str, ...],
+    heaters: tuple[str, ...],
+    centre: NDArray[np.float64],
+    size: float,
+    ground: float | None,
 ) -> layout.Blueprint:
     """Robot to the left above reward and events, curves to the right, time standing still."""
     away = np.array([0.55, -0.75, 0.4])
@@ -379,6 +408,13 @@ def _blueprint(
         )
         for quantity, title in QUANTITIES.items()
     ]
+    if heaters:
+        curves += [
+            layout.TimeSeriesView(
+                origin="/", contents=[_heater(name, quantity) for name in heaters], name=title
+            )
+            for quantity, title in HEATER_QUANTITIES.items()
+        ]
     reward = layout.TimeSeriesView(origin="/reward", name="Reward")
     events = layout.TextLogView(
         origin="/events",

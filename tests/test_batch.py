@@ -37,7 +37,8 @@ def everything(sim: Simulation) -> dict[str, bytes]:
     model, data = sim.model, sim.data
     row = np.empty(mujoco.mj_stateSize(model, STATE))
     mujoco.mj_getState(model, data, row, STATE)
-    found = {"state": row, "power": sim.power, "damaged": sim.spines.damaged}
+    found = {"state": row, "power": sim.power, "damaged": sim.spines.damaged,
+             "voltage": sim.spines.voltage}  # fmt: skip
     found |= {name: getattr(model, name) for name in WRITTEN}
     found |= {name: getattr(data, name) for name in ("xpos", "ten_J", "actuator_force", "qacc")}
     found |= {"warning": data.warning.number, "contact": data.contact.dist}

@@ -18,7 +18,9 @@ from rerun.chunk import RrdReader
 from tca_mj import film as film_module
 from tca_mj import plots, render
 from tca_mj.record import QUANTITIES, Recorder
+from tca_mj.robots.tetrapod import tetrapod
 from tca_mj.shapes import body_paths
+from tca_mj.sim import Simulation
 
 HINGE = int(mujoco.mjtJoint.mjJNT_HINGE)
 
@@ -185,6 +187,29 @@ def test_a_recording_holds_what_was_simulated(tmp_path: Path, simulation: Chain)
     for command in ("verify", "stats"):
         done = rrd(command, recorder.path)
         assert done.returncode == 0, done.stderr
+
+
+def test_the_heaters_of_spines_are_recorded(tmp_path: Path, simulation: Chain) -> None:
+    sim = Simulation(tetrapod(), timestep=5e-3)
+    voltage = np.array([[25.0, 9.5, 0.0], [0.0, 0.0, 3.0]])
+    temperature = []
+    with Recorder(sim, tmp_path / "a.rrd") as recorder:
+        recorder.frame()
+        for each in voltage:
+            sim.step(np.zeros(sim.n), 0.1, voltage=each)
+            recorder.frame()
+            temperature.append(sim.spines.temperature)
+    back = read(recorder.path)
+    for i, name in enumerate(sim.spines.names):
+        got = [v[0] for v in back[f"/heaters/{name}/voltage"]["Scalars:scalars"] if v]
+        assert got == [0.0, *voltage[:, i]]
+        got = [v[0] for v in back[f"/heaters/{name}/temperature"]["Scalars:scalars"] if v]
+        np.testing.assert_array_equal(got, [25.0, *np.array(temperature)[:, i]])
+    assert got[-1] > 25.0
+    assert rrd("verify", recorder.path).returncode == 0
+    with Recorder(simulation, tmp_path / "b.rrd") as recorder:
+        recorder.frame()
+    assert not any(path.startswith("/heaters") for path in read(recorder.path))
 
 
 def test_geometry_is_written_once_and_only_what_moves_has_poses(

@@ -26,6 +26,7 @@ class Spines:
         n: Number of spines.
         names: Their names, in the order of the heater axis.
         state: Heat and shape memory; None if there are no spines.
+        voltage: Voltages of the heaters in the last step, shape (..., n) [V].
         damaged: Whether a TCA has been contracted against a stiff spine since the last reset,
             shape (..., n).
     """
@@ -41,6 +42,7 @@ class Spines:
         self.n = len(spines)
         self.names = tuple(spine.name for spine in spines)
         self.damaged = np.zeros(self.n, dtype=bool)
+        self.voltage = np.zeros(self.n)
         self.state: SpinesState | None = None
         if not self.n:
             return
@@ -76,6 +78,7 @@ class Spines:
             every.bank.heater = stacked([spines.bank.heater for spines in many])
             every.state = stacked([spines.state for spines in many])
             every.damaged = np.stack([spines.damaged for spines in many])
+            every.voltage = np.stack([spines.voltage for spines in many])
         return every
 
     def give_back(self, i: int, one: "Spines") -> None:
@@ -83,6 +86,7 @@ class Spines:
         if self.n:
             one.state = row(self.state, i)
             one.damaged = self.damaged[i].copy()
+            one.voltage = self.voltage[i].copy()
             body, every = one._body, self._body
             body.stiffness, body.rest = every.stiffness[i], every.rest[i]
             body.damping = every.damping[i]
@@ -100,6 +104,7 @@ class Spines:
     def reset(self, motion: Array) -> None:
         """Cold, and fixed in the cells' motions, shape (..., 4, cells) [rad]."""
         self.damaged = np.zeros(self.n, dtype=bool)
+        self.voltage = np.zeros(self.n)
         if self.n:
             memory = self._own[1].reshape(-1)[self._place]
             self.state = self.bank.rest(memory, self._angles(motion))
@@ -140,6 +145,7 @@ class Spines:
             dt: Length of the step [s].
         """
         assert self.state is not None
+        self.voltage = np.array(voltage)
         before = self.state.heat.temperature
         self.state = self.bank.advance(self.state, voltage, fan, self._angles(motion), dt)
         now = self.state.heat.temperature
