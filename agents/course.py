@@ -27,6 +27,10 @@ STEP = Gait(
 """Steps with little headway: a foot that is lifted does not hold the body down by its friction."""
 
 _OFF = 25.0  # temperature at which nothing is heated [°C]
+# A leg curled inwards: where friction holds its foot, it turns the rail outwards.
+_BRACED = (_OFF, 168.0, 168.0)
+_LIFTED = (165.0, _OFF, _OFF)
+_REACHING = (165.0, 165.0, _OFF)  # a leg lifted and bent forward
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -37,7 +41,7 @@ class Go:
         name: Name of the stage.
         gait: Whose temperatures the legs follow.
         until: Where the stage ends, along x [m].
-        patience: Time after which the stage ends wherever the body is [s].
+        patience: Time without headway after which the stage ends wherever the body is [s].
         steers: Deviation of the heading up to which nothing is done; beyond it the legs of one side
             become weaker. None: never [rad].
         pushes: Which legs follow the gait; the others are cold.
@@ -59,11 +63,15 @@ class Bend:
         name: Name of the stage.
         angle: Bend from rail to rail [rad]; None is the memorised shape, which needs no TCA.
         steps: Gait of the legs while the body bends, so that friction does not hold it.
+        braced: Whether the legs curl inwards from beginning to end, which opens the body.
+        reaching: Whether the rear legs reach forward while the body is soft, clear of the desk.
     """
 
     name: str
     angle: float | None
     steps: Gait | None = None
+    braced: bool = False
+    reaching: bool = False
 
 
 def stages(places: Places) -> tuple[Go | Bend, ...]:
@@ -73,17 +81,25 @@ def stages(places: Places) -> tuple[Go | Bend, ...]:
     return (
         Go(name="crawl", gait=CRAWL, until=places.stand, steers=0.0),
         Bend(name="stand up", angle=walking, steps=STEP),
-        # On until the front feet have left the desk wherever they swing; then the rear ones push.
-        Go(name="walk", gait=WALK, until=places.first_edge - station + 0.02, steers=0.0),
-        Go(name="mount", gait=PUSH, until=places.first_edge + station + 0.006, patience=150.0),
-        Bend(name="clamp", angle=np.radians(208.0)),
-        Go(name="shimmy", gait=SHIMMY, until=places.beam_end - 0.005, patience=500.0),
+        # On until the front feet have left the desk wherever they swing; then the rear ones push,
+        # until the roots of their legs have left it as well.
+        Go(name="walk", gait=WALK, until=places.first_edge - station + 0.019, steers=0.0),
+        Go(
+            name="mount", gait=PUSH, until=places.first_edge + station + 0.004, patience=25.0,
+            steers=0.0,
+        ),  # fmt: skip
+        Bend(name="clamp", angle=np.radians(208.0), reaching=True),
+        Go(name="shimmy", gait=SHIMMY, until=places.beam_end - 0.005, patience=120.0),
         # On until the rear spine has left the beam; the front legs, on the desk by then, are cold.
         Go(
-            name="step off", gait=SHIMMY, until=places.beam_end + station - 0.017, patience=200.0,
+            name="step off", gait=SHIMMY, until=places.beam_end + station - 0.015, patience=60.0,
             pushes=(False, False, True, True),
         ),  # fmt: skip
-        Bend(name="open", angle=walking, steps=STEP),
+        # As wide each time as curled legs can open it; between, the legs stretch.
+        *(
+            Bend(name="open", angle=np.radians(angle), steps=STEP, braced=True)
+            for angle in (165.0, 130.0, 97.0)
+        ),
         Go(name="walk on", gait=WALK, until=places.target, steers=0.0),
         Bend(name="lie down", angle=None),
     )
@@ -123,6 +139,7 @@ class CourseWalker:
     def _enter(self) -> None:
         self._time = 0.0  # in this stage, or this part of it
         self._part = "soften"
+        self._best, self._since = -math.inf, 0.0  # foremost place in this stage, and when
         self._integral = 0.0
         self._target = 25.0  # of the spines' TCAs
         self._angle: float | None = None
@@ -149,7 +166,10 @@ class CourseWalker:
     def _over(self, seen: dict[str, Array]) -> bool:
         stage = self._plan[self._number]
         if isinstance(stage, Go):
-            return bool(seen["position"][0] >= stage.until or self._time > stage.patience)
+            x = float(seen["position"][0])
+            if x > self._best + 2e-3:
+                self._best, self._since = x, self._time
+            return x >= stage.until or self._time - self._since > stage.patience
         return self._part == "done"
 
     def _walk(self, stage: Go, seen: dict[str, Array]) -> Array:
@@ -191,7 +211,10 @@ class CourseWalker:
                 self._target = float(np.clip(wanted, 25.0, self.hottest))
                 if self._part == "bend":
                     stepping = abs(error) > 3.0
-                    still = abs(error) < 5.0 and abs(rate) < np.radians(1.0)
+                    # As far as it gets: a TCA that is off lets go no further, a hot one is spent.
+                    spent = self._target < 26.0 if stage.braced else self._target >= self.hottest
+                    near = abs(error) < (5.0 if not spent else 50.0 if stage.braced else 8.0)
+                    still = near and abs(rate) < np.radians(1.0)
                     if (still and self._time > 5.0) or self._time > 60.0:
                         self._go_on("hold")
                 elif self._time > 6.0:
@@ -204,10 +227,16 @@ class CourseWalker:
                 self._go_on("release" if stage.angle is not None else "done")
         elif self._part == "release":
             self._target = 25.0
-            if self._time > 10.0:
+            stepping = stage.braced
+            if self._time > (20.0 if stage.braced else 10.0):
                 self._go_on("done")
         legs = np.full((4, 3), _OFF)
-        if stepping and stage.steps is not None:
+        if stage.reaching and self._part in ("soften", "bend"):
+            lifting = self._part == "soften" and self._time < 3.0
+            legs[2:] = _LIFTED if lifting else _REACHING
+        elif stage.braced and self._part != "release":
+            legs[:] = _BRACED
+        elif stepping and stage.steps is not None:
             legs = stage.steps.temperature(self._time / stage.steps.period).reshape(4, 3)
         return legs, self._target, voltage
 

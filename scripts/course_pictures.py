@@ -24,7 +24,7 @@ from tca_mj.sim import Simulation
 SHAPES = ((20.0, 0.013), (95.0, 0.073), (180.0, 0.108))
 # Time after the start of each stage at which its picture is taken [s].
 MOMENTS = {"crawl": 50.0, "stand up": 14.0, "walk": 12.0, "mount": 20.0, "clamp": 45.0,
-           "shimmy": 60.0, "open": 40.0, "walk on": 25.0}  # fmt: skip
+           "shimmy": 45.0, "open": 100.0, "walk on": 25.0}  # fmt: skip
 LAST = "lie down"  # its picture is the last of all
 
 
@@ -64,6 +64,13 @@ def shapes(out: Path) -> None:
     imageio.imwrite(out / "tetrapod.png", np.concatenate(frames, axis=1))
 
 
+def close(env: TetrapodCourse) -> NDArray[np.uint8]:
+    """A picture of the robot where it is."""
+    x, _, z = env.position
+    camera = view(env.model, float(x) + 0.02, 0.5, 118.0, -14.0, float(z) - 0.03)
+    return picture(env.sim, camera, (480, 360))
+
+
 def course(out: Path, seed: int) -> None:
     """A picture of each stage."""
     env = TetrapodCourse()
@@ -75,16 +82,11 @@ def course(out: Path, seed: int) -> None:
         since = since + env.control_period if walker.phase == stage else 0.0
         stage = walker.phase
         if stage not in frames and since >= MOMENTS.get(stage, np.inf):
-            x = float(env.position[0])
-            camera = view(env.model, x + 0.02, 0.52, 118.0, -17.0, 0.02)
-            frames[stage] = picture(env.sim, camera, (400, 320))
+            frames[stage] = close(env)
             print(f"{env.sim.time:6.1f} s  {stage}", flush=True)
         observation, _, terminated, truncated, info = env.step(action)
         ended = terminated or truncated
-    x = float(env.position[0])
-    frames[LAST] = picture(
-        env.sim, view(env.model, x + 0.02, 0.52, 118.0, -17.0, -0.02), (400, 320)
-    )
+    frames[LAST] = close(env)
     missing = [stage for stage in MOMENTS if stage not in frames]
     if missing or not info["success"]:
         raise SystemExit(f"no picture of {missing}, success {info['success']}")
