@@ -141,6 +141,30 @@ examples:
   tca-mj train TCA/TetrapodWalk-v0 --algo ppo --residual 20 --steps 300000 --out runs/corrected
 """
 
+_SWEEP = """\
+Runs an evaluation, or a training and the evaluation of its best policy, at all combinations of the
+values that --set names, side by side by Ray Tune, and writes into the folder --out:
+  results.csv   one row for each combination: means and 95 % intervals, in SI units
+  results.md    the same as text
+  trials/       the folder of each, in which it goes on where it stopped
+
+A trial whose process or machine is lost is begun again and goes on; so does the whole sweep with
+the same command. Needs `pip install 'tca-mj[sweep]'`.
+
+--set NAME=VALUE,VALUE,... with NAME
+  seed, policy, randomise, episodes, steps, model, timestep    of `tca-mj eval`
+  design.PATH                 a figure of the robot: design.leg.length, design.leg.rod_diameter,
+                              design.leg.tca (name in the catalogue), design.leg.tca.pitch_angle
+  train.FIELD                 with --algo: train.seed, train.steps, train.learner.learning_rate, ...
+A single value sets what is the same in all of them.
+
+examples:
+  tca-mj sweep scripted --task TCA/TetrapodWalk-v0 --episodes 3 --out runs/legs \\
+      --set design.leg.length=0.05,0.055,0.06 --set design.leg.rod_diameter=0.0004,0.00045
+  tca-mj sweep --algo sac --task TCA/BendReach-v0 --out runs/rates \\
+      --set train.seed=0,1,2 --set train.learner.learning_rate=0.001,0.0003 --set train.steps=40000
+"""
+
 _NO_DISPLAY = """\
 tca-mj view: there is no screen to open a window on ({reason}).
 Without a screen you can
@@ -267,6 +291,25 @@ def _parser() -> argparse.ArgumentParser:
     )
     train.set_defaults(run=_train)
 
+    sweep = commands.add_parser(
+        "sweep", help="evaluate or train at many settings", description=_SWEEP,
+        formatter_class=style,
+    )
+    sweep.add_argument("policy", nargs="?", metavar="POLICY", help="who acts; not with --algo")
+    sweep.add_argument(
+        "--task", choices=[task.id for task in TASKS], metavar="TASK", required=True, help="its id"
+    )
+    sweep.add_argument("--algo", choices=ALGORITHMS, help="train this way, then evaluate")
+    sweep.add_argument(
+        "--set", action="append", default=[], type=_axis, metavar="NAME=VALUE,...", dest="axes",
+        help="values of a setting; may be given several times",
+    )
+    sweep.add_argument("--episodes", type=_count, default=5, help="of each evaluation; default 5")
+    sweep.add_argument("--workers", type=_count, default=2, help="trials at a time; default 2")
+    sweep.add_argument("--address", help="of a running Ray cluster; default: one in this machine")
+    sweep.add_argument("--out", type=_folder, required=True, help="folder; seen by all machines")
+    sweep.set_defaults(run=_sweep)
+
     bench = commands.add_parser("bench", help="measure the speed on this machine")
     bench.add_argument(
         "part", nargs="?", choices=["single", "vector"],
@@ -300,6 +343,22 @@ def _count(text: str) -> int:
     if _seed(text) < 1:
         raise argparse.ArgumentTypeError(f"must be at least 1, got {text}")
     return int(text)
+
+
+def _axis(text: str) -> tuple[str, tuple[Any, ...]]:
+    name, _, values = text.partition("=")
+    if not name or not values:
+        raise argparse.ArgumentTypeError(f"must be NAME=VALUE,..., got {text!r}")
+
+    def value(part: str) -> float | int | str:
+        for kind in (int, float):
+            try:
+                return kind(part)
+            except ValueError:
+                continue
+        return part
+
+    return name, tuple(value(part) for part in values.split(","))
 
 
 def _seed(text: str) -> int:
@@ -512,6 +571,38 @@ def _command(arguments: argparse.Namespace) -> str:
         if value is not None and not (option == "seed" and arguments.seeds):
             words += [f"--{option}", f"{value:g}" if isinstance(value, float) else str(value)]
     return shlex.join(words)
+
+
+def _sweep(arguments: argparse.Namespace) -> int:
+    from tca_mj.agents.evaluate import Evaluation
+    from tca_mj.agents.sweep import PAGE, TABLE, Sweep, run_sweep
+
+    if (arguments.policy is None) == (arguments.algo is None):
+        print("tca-mj sweep: give POLICY or --algo", file=sys.stderr)
+        return 2
+    try:
+        sweep = Sweep(
+            evaluation=Evaluation(
+                task=arguments.task, policy=arguments.policy or "off", episodes=arguments.episodes
+            ),
+            axes=dict(arguments.axes),
+            algorithm=arguments.algo,
+        )
+        run_sweep(
+            sweep, arguments.out, workers=arguments.workers, address=arguments.address
+        )
+    except ImportError as error:
+        print(f"tca-mj sweep: {error}; pip install 'tca-mj[sweep]'", file=sys.stderr)
+        return 2
+    except (FileNotFoundError, ValueError) as error:
+        print(f"tca-mj sweep: {error}", file=sys.stderr)
+        return 2
+    except RuntimeError as error:
+        print(f"tca-mj sweep: {error}", file=sys.stderr)
+        return 1
+    print((arguments.out / PAGE).read_text(encoding="utf-8"))
+    print(f"{arguments.out / TABLE}\n{arguments.out / PAGE}")
+    return 0
 
 
 def _bench(arguments: argparse.Namespace) -> int:

@@ -54,6 +54,7 @@ LOWEST = {
     "stable_baselines3": "agents",
     "torch": "agents",
     "cmaes": "agents",
+    "ray": "agents",
     "tqdm": "agents",
 }
 # Third-party packages that belong to single files or packages instead: where, and nowhere else.

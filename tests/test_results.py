@@ -12,7 +12,7 @@ from tca_mj.registry import TASKS
 
 ROOT = Path(__file__).resolve().parent.parent
 RESULTS = json.loads((ROOT / "docs" / "results.json").read_text(encoding="utf-8"))
-SHARE = 0.6  # of the documented figure, in an episode that is a third as long and begins cold
+SHARE = 0.6  # of the documented figure, in an episode that is half as long and begins cold
 GAITS = [task.id for task in TASKS if "gait" in task.kwargs]
 
 
@@ -47,7 +47,7 @@ def test_every_shipped_policy_is_on_the_page():
     [pytest.param(*each, id=f"{each[0]}-{each[1]}") for each in documented() if each[0] in GAITS],
 )
 def test_a_gait_is_about_as_fast_as_documented(task, name, figures):
-    settings = Evaluation(task=task, policy=name, episodes=1, steps=200)
+    settings = Evaluation(task=task, policy=name, episodes=1, steps=300)
     found = evaluate(settings, progress=False)["episodes"][0]
     assert found["success"]
     assert found["speed"] >= SHARE * figures["speed"]["mean"]
