@@ -1,0 +1,264 @@
+"""Sweeps: the same evaluation or training at many settings, side by side, by Ray Tune.
+
+Every trial has a folder of its own, in which it goes on where it stopped (see ``evaluate``,
+``train`` and ``search``). So a trial whose process or machine is lost is begun again by Ray and
+loses what was under way, and so does a sweep that is called a second time. Ray is loaded when a
+sweep begins; the extra ``sweep`` installs it.
+"""
+
+import csv
+import hashlib
+import io
+import itertools
+import json
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields, replace
+from pathlib import Path
+from typing import Any
+
+from tca_mj.agents.evaluate import Evaluation, evaluate
+from tca_mj.agents.policy import write_whole
+from tca_mj.machine import machine, versions
+
+TRIALS, RESULT = "trials", "result.json"
+TABLE, PAGE, ABOUT = "results.csv", "results.md", "sweep.json"
+ALGORITHMS = ("cma", "ppo", "sac", "td3")
+
+Value = float | int | str
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Sweep:
+    """What is swept.
+
+    Attributes:
+        evaluation: What is measured at each setting, where an axis says nothing else.
+        axes: Values by name; all combinations are run. Names are fields of ``Evaluation``,
+            ``design.PATH`` for a figure of the robot (see ``tca_mj.agents.design.robot_of``), and
+            with an algorithm ``train.FIELD`` or ``train.learner.FIELD`` of the training's settings.
+        algorithm: Whether a policy is trained first, and how: one of ``ALGORITHMS``. What is
+            evaluated is then the best policy of the run. Training is on the default robot.
+
+    Raises:
+        ValueError: If a name is unknown, a value cannot be, or an axis has no value or one twice.
+    """
+
+    evaluation: Evaluation
+    axes: Mapping[str, Sequence[Value]]
+    algorithm: str | None = None
+
+    def __post_init__(self) -> None:
+        if self.algorithm not in (None, *ALGORITHMS):
+            raise ValueError(f"algorithm must be one of {ALGORITHMS}, got {self.algorithm!r}")
+        for name, values in self.axes.items():
+            if not values or len(set(values)) != len(values):
+                raise ValueError(f"{name} must have one or more values, all different: {values}")
+        for trial in self.trials():
+            trial.config()  # whoever is wrong says so before anything runs
+
+    def trials(self) -> list["Trial"]:
+        """All combinations."""
+        combinations = itertools.product(*self.axes.values())
+        return [Trial(self, dict(zip(self.axes, point, strict=True))) for point in combinations]
+
+
+@dataclass(frozen=True, slots=True)
+class Trial:
+    """One setting of a sweep.
+
+    Attributes:
+        sweep: What it belongs to.
+        point: Value of each axis.
+    """
+
+    sweep: Sweep
+    point: Mapping[str, Value]
+
+    @property
+    def name(self) -> str:
+        """Name of the folder: the same for the same settings, whatever else is swept."""
+        about = repr((self.sweep.evaluation, self.sweep.algorithm, sorted(self.point.items())))
+        return hashlib.sha256(about.encode()).hexdigest()[:12]
+
+    def evaluation(self, folder: Path) -> Evaluation:
+        """What is measured; the policy is that of the run in ``folder`` if one is trained."""
+        known = {entry.name for entry in fields(Evaluation)} - {"design", "task"}
+        design = dict(self.sweep.evaluation.design)
+        change: dict[str, Any] = {}
+        for name, value in self.point.items():
+            head, _, rest = name.partition(".")
+            if head == "design" and rest:
+                design[rest] = value
+            elif name in known and not (name == "policy" and self.sweep.algorithm):
+                change[name] = value
+            elif head != "train" or self.sweep.algorithm is None:
+                raise ValueError(
+                    f"{name!r} must be design.PATH, with an algorithm train.FIELD, or one of"
+                    f" {sorted(known)}"
+                )
+        if self.sweep.algorithm:
+            change["policy"] = str(folder)
+        return replace(self.sweep.evaluation, **change, design=design)
+
+    def config(self) -> Any:
+        """Settings of the training, or None."""
+        self.evaluation(Path())
+        change: dict[str, Any] = {
+            name.removeprefix("train."): value
+            for name, value in self.point.items()
+            if name.startswith("train.")
+        }
+        task = self.sweep.evaluation.task
+        try:
+            if self.sweep.algorithm == "cma":
+                from tca_mj.agents.search import SearchConfig
+
+                return SearchConfig(**{"task": task, **change})
+            if self.sweep.algorithm is None:
+                return None
+            from tca_mj.agents.config import default_config
+
+            inner = {name.removeprefix("learner."): change.pop(name)
+                     for name in list(change) if name.startswith("learner.")}  # fmt: skip
+            config = default_config(task, self.sweep.algorithm, **change)
+            return replace(config, learner=replace(config.learner, **inner))
+        except TypeError as error:  # no such field
+            raise ValueError(f"train: {error}") from error
+
+    def run(self, folder: Path) -> dict[str, Any]:
+        """Trains if it has to, evaluates, and writes ``result.json``; goes on where it stopped."""
+        config = self.config()
+        if config is not None:
+            if self.sweep.algorithm == "cma":
+                from tca_mj.agents.search import search
+
+                search(config, folder, workers=1, progress=False)
+            else:
+                from tca_mj.agents.train import train
+
+                train(config, folder, video=False, progress=False)
+        summary = evaluate(self.evaluation(folder), out=folder / "evaluation", progress=False)
+        result = {"point": dict(self.point), "figures": summary["figures"]}
+        text = json.dumps(result, indent=1, ensure_ascii=False) + "\n"
+        write_whole(folder / RESULT, text.encode())
+        return result
+
+
+def run_sweep(
+    sweep: Sweep,
+    out: Path,
+    *,
+    workers: int = 2,
+    address: str | None = None,
+    failures: int = 3,
+) -> list[dict[str, Any]]:
+    """Runs what is missing of the trials and writes the table of all.
+
+    Into ``out`` go ``trials/NAME/``, ``sweep.json`` (axes, versions, machine), ``results.csv`` and
+    ``results.md``. Trials that ended in an error are left out of the table and named.
+
+    Args:
+        sweep: What is swept.
+        out: Folder; on a cluster one that all machines see under the same path.
+        workers: Trials at a time, each in a process of its own with one core.
+        address: Address of a running Ray cluster, as ``ray.init`` takes it; None for a cluster in
+            this machine that ends with the sweep.
+        failures: How often a trial is begun again whose process was lost.
+
+    Returns:
+        For each finished trial its ``point`` and its ``figures``, in the order of the axes.
+
+    Raises:
+        ImportError: If Ray is not installed.
+        RuntimeError: If trials ended in an error; what the others found is written.
+        ValueError: If ``workers`` or ``failures`` is out of range.
+    """
+    if workers < 1 or failures < 0:
+        raise ValueError(f"workers must be at least 1 and failures 0, got {workers, failures}")
+    out = out.absolute()
+    trials = sweep.trials()
+    folders = {trial.name: out / TRIALS / trial.name for trial in trials}
+    missing = [trial for trial in trials if not (folders[trial.name] / RESULT).is_file()]
+    about = {"axes": {k: list(v) for k, v in sweep.axes.items()}, "versions": versions("ray"),
+             "machine": machine(), "command": repr(sweep)}  # fmt: skip
+    write_whole(out / ABOUT, (json.dumps(about, indent=1, ensure_ascii=False) + "\n").encode())
+    errors = _tune(missing, out, workers, address, failures) if missing else {}
+    found = []
+    for trial in trials:
+        file = folders[trial.name] / RESULT
+        if file.is_file():
+            found.append(json.loads(file.read_text(encoding="utf-8")))
+    _write(sweep, found, out)
+    if errors:
+        raise RuntimeError(f"{len(errors)} trials ended in an error: {errors}")
+    return found
+
+
+def _tune(
+    trials: Sequence[Trial], out: Path, workers: int, address: str | None, failures: int
+) -> dict[str, str]:
+    """Lets Ray Tune run the trials; returns what went wrong, by the trial's point."""
+    import ray
+    from ray import tune
+
+    def trainable(config: dict[str, Any]) -> None:
+        trial = trials[config["number"]]
+        result = trial.run(out / TRIALS / trial.name)
+        tune.report({name: row["mean"] for name, row in result["figures"].items()})
+
+    begun = not ray.is_initialized()
+    if begun:
+        local: dict[str, Any] = {"num_cpus": workers, "include_dashboard": False}
+        variables = {"OMP_NUM_THREADS": "1", "PYTHONPATH": os.environ.get("PYTHONPATH", "")}
+        ray.init(
+            address=address or "local", log_to_driver=False,
+            runtime_env={"env_vars": variables}, **({} if address else local),
+        )  # fmt: skip
+    try:
+        tuner = tune.Tuner(
+            tune.with_resources(trainable, {"cpu": 1}),
+            param_space={"number": tune.grid_search(list(range(len(trials))))},
+            tune_config=tune.TuneConfig(max_concurrent_trials=workers, reuse_actors=True),
+            run_config=tune.RunConfig(
+                name="ray", storage_path=str(out), verbose=0,
+                failure_config=tune.FailureConfig(max_failures=failures),
+            ),
+        )  # fmt: skip
+        results = tuner.fit()
+        ended = [results[i] for i in range(len(results))]
+        return {
+            json.dumps(dict(trials[result.config["number"]].point)): str(result.error)
+            for result in ended
+            if result.error is not None and result.config
+        }
+    finally:
+        if begun:
+            ray.shutdown()
+
+
+def _write(sweep: Sweep, found: Sequence[dict[str, Any]], out: Path) -> None:
+    """The table, as CSV in SI units and as Markdown."""
+    from tca_mj.agents.evaluate import METRICS, cell
+
+    names = [name for name in METRICS if any(name in row["figures"] for row in found)]
+    none = dict.fromkeys(("mean", "low", "high"))
+    columns = [*sweep.axes, *(f"{name}{end}" for name in names for end in ("", "_low", "_high"))]
+    text = io.StringIO()
+    table = csv.DictWriter(text, columns, lineterminator="\n")
+    table.writeheader()
+    heads = [name.replace("_", " ") + (f" [{METRICS[name][0]}]" if METRICS[name][0] else "")
+             for name in names]  # fmt: skip
+    heads = [*sweep.axes, *heads]
+    lines = [f"| {' | '.join(heads)} |", "|---" * len(heads) + "|"]
+    for row in found:
+        flat = dict(row["point"])
+        figures = {name: row["figures"].get(name, none) for name in names}
+        for name, figure in figures.items():
+            flat |= {name: figure["mean"], f"{name}_low": figure["low"],
+                     f"{name}_high": figure["high"]}  # fmt: skip
+        table.writerow(flat)
+        cells = [cell(name, figure) for name, figure in figures.items()]
+        lines.append(f"| {' | '.join([*map(str, row['point'].values()), *cells])} |")
+    write_whole(out / TABLE, text.getvalue().encode())
+    write_whole(out / PAGE, ("\n".join(lines) + "\n").encode())

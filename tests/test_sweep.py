@@ -1,0 +1,206 @@
+"""Sweeps: their settings and tables; with Ray, that a lost process costs nothing."""
+
+import csv
+import importlib.util
+import json
+import os
+import signal
+import threading
+from pathlib import Path
+
+import pytest
+
+from tca_mj import cli
+from tca_mj.agents import sweep as module
+from tca_mj.agents.design import designed, robot_of
+from tca_mj.agents.evaluate import Evaluation
+from tca_mj.agents.sweep import RESULT, TRIALS, Sweep, run_sweep
+from tca_mj.robots.tetrapod import TetrapodSpec
+from tca_mj.tca import CATALOGUE
+
+REACH, WALK = "TCA/BendReach-v0", "TCA/TetrapodWalk-v0"
+SHORT = Evaluation(task=REACH, policy="random", episodes=2, steps=3)
+
+
+def one_by_one(trials, out, workers, address, failures):
+    """In place of Ray: the trials one after the other in this process."""
+    for trial in trials:
+        trial.run(out / TRIALS / trial.name)
+    return {}
+
+
+def test_designs_are_single_figures():
+    spec = TetrapodSpec()
+    design = {"leg.length": 0.05, "leg.tca.pitch_angle": 0.25, "leg.tca": "type-2-180", "nodes": 3}
+    other = designed(spec, design)
+    assert other.leg.length == 0.05 and other.nodes == 3 and other.spine == spec.spine
+    assert other.leg.tca == CATALOGUE["type-2-180"].of_pitch(0.25)
+    assert robot_of(REACH, {"offset": 3e-3})["module_spec"].offset == 3e-3
+
+
+@pytest.mark.parametrize(
+    ("design", "message"),
+    [
+        ({"leg.size": 1.0}, r"design 'leg.size': 'size' must be one of \['length'"),
+        ({"leg.length": "long"}, "design 'leg.length' must be a number like 0.055, got 'long'"),
+        ({"leg.tca": "no-such"}, "design 'leg.tca' must be one of .* got 'no-such'"),
+        ({"leg.length": -1.0}, "length"),
+    ],
+)
+def test_bad_designs_are_refused(design, message):
+    with pytest.raises(ValueError, match=message):
+        Evaluation(task=WALK, design=design)
+    with pytest.raises(ValueError, match="design must be empty for TCA/TetrapodCourse-v0"):
+        robot_of("TCA/TetrapodCourse-v0", design)
+
+
+def test_every_combination_is_run_and_tabled(tmp_path, monkeypatch):
+    monkeypatch.setattr(module, "_tune", one_by_one)
+    axes = {"design.length": (0.04, 0.05), "policy": ("off", "random")}
+    sweep = Sweep(evaluation=SHORT, axes=axes)
+    found = run_sweep(sweep, tmp_path)
+    points = [{"design.length": length, "policy": who} for length in (0.04, 0.05)
+              for who in ("off", "random")]  # fmt: skip
+    assert [row["point"] for row in found] == points
+    with (tmp_path / "results.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert [float(row["design.length"]) for row in rows] == [0.04, 0.04, 0.05, 0.05]
+    assert [float(row["energy"]) > 0.1 for row in rows] == [False, True, False, True]
+    assert float(rows[1]["return"]) != float(rows[3]["return"])  # another robot
+    assert float(rows[1]["return_low"]) < float(rows[1]["return"]) < float(rows[1]["return_high"])
+    page = (tmp_path / "results.md").read_text().splitlines()
+    assert page[0].startswith("| design.length | policy | return | success [%] |")
+    assert len(page) == 6
+    # Called again with one value more, only what is missing is run.
+    ran = []
+
+    def counted(trials, *more):
+        ran.extend(trial.point for trial in trials)
+        return one_by_one(trials, *more)
+
+    monkeypatch.setattr(module, "_tune", counted)
+    more = Sweep(evaluation=SHORT, axes={"design.length": (0.04, 0.05), "policy": ("off",)})
+    assert run_sweep(more, tmp_path) == [found[0], found[2]] and ran == []
+    wider = Sweep(evaluation=SHORT, axes={"design.length": (0.04, 0.06), "policy": ("off",)})
+    run_sweep(wider, tmp_path)
+    assert ran == [{"design.length": 0.06, "policy": "off"}]
+
+
+def test_trials_that_fail_are_named_and_the_others_tabled(tmp_path, monkeypatch):
+    def half(trials, out, *more):
+        one_by_one(trials[:1], out, *more)
+        return {"the second": "ValueError"}
+
+    monkeypatch.setattr(module, "_tune", half)
+    sweep = Sweep(evaluation=SHORT, axes={"seed": (0, 5)})
+    with pytest.raises(RuntimeError, match="1 trials ended in an error: .*the second"):
+        run_sweep(sweep, tmp_path)
+    assert len((tmp_path / "results.csv").read_text().splitlines()) == 2
+
+
+def test_settings_of_a_training_reach_it():
+    pytest.importorskip("cmaes")
+    sweep = Sweep(evaluation=Evaluation(task=WALK), algorithm="cma",
+                  axes={"train.sigma": (0.02, 0.05), "train.seed": (3,)})  # fmt: skip
+    configs = [trial.config() for trial in sweep.trials()]
+    assert [config.sigma for config in configs] == [0.02, 0.05]
+    assert all(config.seed == 3 and config.task == WALK for config in configs)
+    folder = Path("somewhere")
+    assert sweep.trials()[0].evaluation(folder).policy == "somewhere"
+    assert len({trial.name for trial in sweep.trials()}) == 2
+    deep = Sweep(evaluation=SHORT, algorithm="sac", axes={"train.learner.gamma": (0.9,),
+                 "train.steps": (1000,)})  # fmt: skip
+    config = deep.trials()[0].config()
+    assert config.learner.gamma == 0.9 and config.steps == 1000 and config.task == REACH
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"axes": {"size": (1,)}}, "'size' must be design.PATH, with an algorithm train.FIELD"),
+        ({"axes": {"train.seed": (1,)}}, "'train.seed' must be design.PATH"),
+        ({"axes": {"seed": ()}}, "seed must have one or more values, all different"),
+        ({"axes": {"seed": (1, 1)}}, "seed must have one or more values, all different"),
+        ({"axes": {"seed": (-1,)}}, "seed must be a whole number of at least 0, got -1"),
+        ({"axes": {}, "algorithm": "luck"}, "algorithm must be one of .* got 'luck'"),
+        ({"axes": {"train.size": (1,)}, "algorithm": "sac"}, "train: .*'size'"),
+        ({"axes": {"policy": ("off",)}, "algorithm": "sac"}, "'policy' must be"),
+    ],
+)
+def test_bad_sweeps_are_refused(change, message):
+    with pytest.raises(ValueError, match=message):
+        Sweep(**{"evaluation": SHORT, **change})
+
+
+def test_the_command_sweeps(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(module, "_tune", one_by_one)
+    command = ["sweep", "off", "--task", REACH, "--episodes", "1", "--out", str(tmp_path)]
+    assert cli.main([*command, "--set", "steps=2", "--set", "design.offset=0.003,0.004"]) == 0
+    said = capsys.readouterr().out
+    assert "| steps | design.offset | return |" in said and "| 2 | 0.003 |" in said
+    assert cli.main([*command, "--set", "stepps=2"]) == 2
+    assert cli.main([*command, "--algo", "sac"]) == 2
+    assert cli.main([*command[:1], *command[2:]]) == 2
+    with pytest.raises(SystemExit):
+        cli.main([*command, "--set", "steps"])
+
+
+@pytest.mark.skipif(importlib.util.find_spec("ray") is not None, reason="ray is installed")
+def test_without_ray_it_says_what_to_install(tmp_path, capsys):
+    command = ["sweep", "off", "--task", REACH, "--set", "steps=2", "--out", str(tmp_path)]
+    assert cli.main(command) == 2
+    assert "pip install 'tca-mj[sweep]'" in capsys.readouterr().err
+
+
+def workers_of_ray():
+    """Ids of Ray's workers that this process has started, by way of others."""
+    parents, names = {}, {}
+    for folder in Path("/proc").glob("[0-9]*"):
+        try:
+            fields = (folder / "stat").read_text().rpartition(")")[2].split()
+            names[int(folder.name)] = (folder / "cmdline").read_text()
+        except OSError:
+            continue  # it has just ended
+        parents[int(folder.name)] = int(fields[1])
+    found = []
+    for process, name in names.items():
+        above = process
+        while above in parents and above != os.getpid():
+            above = parents[above]
+        if above == os.getpid() and name.startswith("ray::") and "IDLE" not in name:
+            found.append(process)
+    return found
+
+
+@pytest.mark.skipif(not Path("/proc").is_dir(), reason="looks for processes in /proc")
+def test_a_trial_whose_process_is_lost_goes_on(tmp_path):
+    """By Ray: workers are killed outright as soon as an episode is finished."""
+    pytest.importorskip("ray.tune")
+    evaluation = Evaluation(task=REACH, policy="random", episodes=6, steps=150)
+    sweep = Sweep(evaluation=evaluation, axes={"seed": (0, 10)})
+    killed = []
+
+    def kill():
+        while not killed and not over.wait(0.02):
+            if any(tmp_path.glob(f"sweep/{TRIALS}/*/evaluation/episodes.jsonl")):
+                for process in workers_of_ray():
+                    os.kill(process, signal.SIGKILL)
+                    killed.append(process)
+
+    over = threading.Event()
+    killer = threading.Thread(target=kill)
+    killer.start()
+    try:
+        found = run_sweep(sweep, tmp_path / "sweep", workers=2)
+    finally:
+        over.set()
+        killer.join()
+    assert killed
+    for row, trial in zip(found, sweep.trials(), strict=True):
+        assert row["figures"] == trial.run(tmp_path / "alone" / trial.name)["figures"]
+        folder = tmp_path / "sweep" / TRIALS / trial.name
+        lines = (folder / "evaluation" / "episodes.jsonl").read_text().splitlines()
+        seeds = [json.loads(line)["seed"] for line in lines]
+        first = int(trial.point["seed"])
+        assert seeds == list(range(first, first + 6))  # what was finished was not run again
+        assert (folder / RESULT).is_file()
