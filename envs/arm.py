@@ -118,22 +118,12 @@ class ArmPickPlace(SimulatedTask):
         Raises:
             ValueError: If the render mode is unknown or the arm cannot be built.
         """
-        if render_mode not in (None, *self.metadata["render_modes"]):
-            raise ValueError(
-                f"render_mode must be None or one of {self.metadata['render_modes']},"
-                f" got {render_mode!r}"
-            )
-        if camera not in CAMERAS:
-            raise ValueError(f"camera must be one of {CAMERAS}, got {camera!r}")
-        pixels = numbers("size", size, (2,))
-        if pixels.min() < 1.0:
-            raise ValueError(f"size must be at least 1 pixel each way, got {size}")
+        self._look(render_mode, camera, size, cameras=CAMERAS)
         updates = self.control_period / (5.0 * timestep) if timestep > 0.0 else 0.0
         if not (np.isfinite(updates) and updates > 0.5 and abs(updates - round(updates)) < 1e-9):
             raise ValueError(
                 f"timestep must be {self.control_period} s over a multiple of 5, got {timestep}"
             )
-        self.render_mode: str | None = render_mode
         self.arm_spec = arm_spec or ArmSpec()
         files = ["cup", *(name for kind in OBJECTS for name in (kind, f"{kind}_stand"))]
         part = scene(
@@ -142,7 +132,6 @@ class ArmPickPlace(SimulatedTask):
         self.sim = Simulation(part, timestep=timestep, tca_period=5.0 * timestep)
         self.observation_space = OBSERVATION.space
         self.action_space = ACTION.space
-        self._camera, self._size = camera, size
         self.object = "screwdriver"
         self._in_cup, self._carried = 0, False
         self._find(self.model)

@@ -1,6 +1,7 @@
 """What all tasks share: a simulation, how tools reach it, and its picture."""
 
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from typing import Any, ClassVar
 
 import gymnasium as gym
@@ -37,6 +38,30 @@ class SimulatedTask(gym.Env[Observation, Action], ABC):
     _camera: str
     _size: tuple[int, int]
     _screen: Offscreen | None = None
+
+    def _look(
+        self,
+        render_mode: str | None,
+        camera: str,
+        size: tuple[int, int],
+        *,
+        cameras: Sequence[str],
+        prefix: str = "",
+    ) -> None:
+        """Keeps how the task is to be drawn: by ``camera``, one of ``cameras``.
+
+        Raises:
+            ValueError: If the mode or the camera is unknown, or the size below a pixel.
+        """
+        modes = self.metadata["render_modes"]
+        if render_mode not in (None, *modes):
+            raise ValueError(f"render_mode must be None or one of {modes}, got {render_mode!r}")
+        if camera not in cameras:
+            raise ValueError(f"camera must be one of {list(cameras)}, got {camera!r}")
+        if numbers("size", size, (2,)).min() < 1.0:
+            raise ValueError(f"size must be at least 1 pixel each way, got {size}")
+        self.render_mode = render_mode
+        self._camera, self._size = prefix + camera, size
 
     @abstractmethod
     def begin(self, command: NDArray[np.float64]) -> Drive:

@@ -140,22 +140,13 @@ class TetrapodCourse(SimulatedTask):
         Raises:
             ValueError: If an argument is unknown or the robot cannot be built.
         """
-        if render_mode not in (None, *self.metadata["render_modes"]):
-            raise ValueError(
-                f"render_mode must be None or one of {self.metadata['render_modes']},"
-                f" got {render_mode!r}"
-            )
-        if camera not in CAMERAS:
-            raise ValueError(f"camera must be one of {CAMERAS}, got {camera!r}")
-        if numbers("size", size, (2,)).min() < 1.0:
-            raise ValueError(f"size must be at least 1 pixel each way, got {size}")
+        self._look(render_mode, camera, size, cameras=CAMERAS)
         updates = self.control_period / tca_period if tca_period > 0.0 else 0.0
         if not (updates > 0.5 and abs(updates - round(updates)) < 1e-9):
             raise ValueError(
                 f"tca_period must divide the control period {self.control_period} s,"
                 f" got {tca_period}"
             )
-        self.render_mode: str | None = render_mode
         self.robot = robot or TetrapodSpec(
             spine=LIFTING_SPINE, heater=HeaterSpec.fitted(LIFTING_SPINE)
         )
@@ -164,7 +155,6 @@ class TetrapodCourse(SimulatedTask):
         )
         self.observation_space = OBSERVATION.space
         self.action_space = ACTION.space
-        self._camera, self._size = camera, size
         self._nominal = Nominal(self.sim)
         self._find(self.model)
         self.touched = False

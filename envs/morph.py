@@ -118,28 +118,17 @@ class MorphModule(SimulatedTask):
         Raises:
             ValueError: If an argument is out of range or the module cannot be built.
         """
-        if render_mode not in (None, *self.metadata["render_modes"]):
-            raise ValueError(
-                f"render_mode must be None or one of {self.metadata['render_modes']},"
-                f" got {render_mode!r}"
-            )
-        if camera not in CAMERAS:
-            raise ValueError(f"camera must be one of {CAMERAS}, got {camera!r}")
-        pixels = numbers("size", size, (2,))
-        if pixels.min() < 1.0:
-            raise ValueError(f"size must be at least 1 pixel each way, got {size}")
+        self._look(render_mode, camera, size, cameras=CAMERAS, prefix="stand.")
         steps = self.control_period / timestep if timestep > 0.0 else 0.0
         if not (np.isfinite(steps) and steps > 0.5 and abs(steps - round(steps)) < 1e-9):
             raise ValueError(
                 f"timestep must be {self.control_period} s over a whole number, got {timestep}"
             )
-        self.render_mode: str | None = render_mode
         self.module_spec = module_spec or MorphingSpec(motions=("bend_x",))
         part = hanging_module(self.module_spec)
         self.sim = Simulation(part, timestep=timestep, tca_period=self.control_period)
         self.observation_space = OBSERVATION.space
         self.action_space = ACTION.space
-        self._camera, self._size = f"stand.{camera}", size
         self.target = self.target_range[1]
         self._at_goal, self._used = 0, 0.0
         self._find(self.model, part)

@@ -100,22 +100,13 @@ class BendReach(SimulatedTask):
         Raises:
             ValueError: If an argument is unknown or out of range, or the module cannot be built.
         """
-        for name, value, known in (
-            ("render_mode", render_mode, [None, *self.metadata["render_modes"]]),
-            ("camera", camera, list(CAMERAS)),
-        ):
-            if value not in known:
-                raise ValueError(f"{name} must be one of {known}, got {value!r}")
-        if numbers("size", size, (2,)).min() < 1.0:
-            raise ValueError(f"size must be at least 1 pixel each way, got {size}")
-        self.render_mode: str | None = render_mode
+        self._look(render_mode, camera, size, cameras=CAMERAS, prefix="stand.")
         self.module_spec = module_spec or BendingSpec()
         self.static = StaticTip(self.module_spec, timestep=timestep)
         self.sim = self.static.sim
         self.observation_space = OBSERVATION.space
         self.action_space = ACTION.space
         self._nominal = Nominal(self.sim)
-        self._camera, self._size = f"stand.{camera}", size
         self._mocap = int(self.model.body("stand.target").mocapid[0])
         self.target = np.zeros(3)
         self.target_temperature = self.sim.temperature.copy()

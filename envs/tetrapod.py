@@ -140,18 +140,11 @@ class TetrapodGait(SimulatedTask):
         Raises:
             ValueError: If an argument is unknown or out of range, or the robot cannot be built.
         """
-        for name, value, known in (
-            ("gait", gait, list(TASKS)),
-            ("render_mode", render_mode, [None, *self.metadata["render_modes"]]),
-            ("camera", camera, list(CAMERAS)),
-        ):
-            if value not in known:
-                raise ValueError(f"{name} must be one of {known}, got {value!r}")
-        if numbers("size", size, (2,)).min() < 1.0:
-            raise ValueError(f"size must be at least 1 pixel each way, got {size}")
+        if gait not in TASKS:
+            raise ValueError(f"gait must be one of {list(TASKS)}, got {gait!r}")
+        self._look(render_mode, camera, size, cameras=CAMERAS)
         self.gait = gait
         self.task = TASKS[gait]
-        self.render_mode: str | None = render_mode
         self.robot = robot or TetrapodSpec()
         objects = {} if self.task.beam is None else {"beam": mjcf("beam.xml")}
         self.sim = tetrapod_scene(
@@ -166,7 +159,6 @@ class TetrapodGait(SimulatedTask):
         self.observation_space = OBSERVATION.space
         self.action_space = ACTION.space
         self._nominal = Nominal(self.sim)
-        self._camera, self._size = camera, size
         self._forward = np.array([1.0, 0.0])
         self._start = np.zeros(3)
         self._progress = self._judge()

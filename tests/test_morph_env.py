@@ -264,7 +264,7 @@ def test_bad_actions_are_refused(shared, action, message):
     ("options", "message"),
     [
         ({"render_mode": "human"}, "render_mode must be None or one of .* got 'human'"),
-        ({"camera": "close"}, r"camera must be one of \('front', 'side'\), got 'close'"),
+        ({"camera": "close"}, r"camera must be one of \['front', 'side'\], got 'close'"),
         ({"size": (0, 10)}, r"size must be at least 1 pixel each way, got \(0, 10\)"),
         ({"timestep": 3e-3}, "timestep must be 0.1 s over a whole number, got 0.003"),
         ({"timestep": 0.0}, "timestep must be 0.1 s over a whole number, got 0.0"),

@@ -370,7 +370,7 @@ def test_bad_actions_are_refused(shared, action, message):
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"render_mode": "human"}, "render_mode must be one of .* got 'human'"),
+        ({"render_mode": "human"}, "render_mode must be None or one of .* got 'human'"),
         ({"camera": "close"}, r"camera must be one of \['front', 'side'\], got 'close'"),
         ({"size": (0, 10)}, r"size must be at least 1 pixel each way, got \(0, 10\)"),
         ({"timestep": 3e-3}, "tca_period must be a positive multiple of timestep 0.003"),

@@ -382,7 +382,7 @@ def test_bad_actions_are_refused(walker, action, message):
     ("arguments", "message"),
     [
         ({"gait": "gallop"}, r"gait must be one of \['crawl', 'walk', 'shimmy'\], got 'gallop'"),
-        ({"render_mode": "human"}, "render_mode must be one of .* got 'human'"),
+        ({"render_mode": "human"}, "render_mode must be None or one of .* got 'human'"),
         ({"camera": "back"}, "camera must be one of .* got 'back'"),
         ({"size": (0, 10)}, r"size must be at least 1 pixel each way, got \(0, 10\)"),
         ({"timestep": 3e-3}, r"tca_period must be a positive multiple of timestep 0\.003 s"),
