@@ -69,6 +69,12 @@ One's own policy is measured by `tca-mj eval POLICY --task TASK`, with `--random
 `--timestep`; `tca-mj demo --policy POLICY --task TASK` films it.
 """
 
+# What the tables do not say by themselves, as measured with the policies of this version.
+NOTES = {
+    "TCA/TetrapodShimmy-v0": "On legs that twist no policy shimmies: it owes its speed to rods that"
+    " are stiff in torsion, see [the model](tetrapod-model.md#legs-without-twist).",
+}
+
 
 def cases(tasks: list[str]) -> Iterator[tuple[str, str, str, Evaluation]]:
     """Task, policy and condition, with what is to be run."""
@@ -149,6 +155,7 @@ def page(results: dict[str, dict[str, dict[str, Any]]]) -> str:
     lines = [INTRODUCTION]
     for task, found in results.items():
         lines += [f"## `{task}`", "", *table(task, found), ""]
+        lines += [NOTES[task], ""] if task in NOTES else []
     drawn = curves()
     if drawn:
         lines += ["## Learning curves", "", *drawn]

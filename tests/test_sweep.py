@@ -167,11 +167,12 @@ def workers_of_ray():
         above = process
         while above in parents and above != os.getpid():
             above = parents[above]
-        if above == os.getpid() and name.startswith("ray::") and "IDLE" not in name:
+        if above == os.getpid() and name.startswith("ray::ImplicitFunc"):  # not Ray's own agents
             found.append(process)
     return found
 
 
+@pytest.mark.skipif(not os.environ.get("TCA_MJ_RAY"), reason="takes minutes; TCA_MJ_RAY=1 runs it")
 @pytest.mark.skipif(not Path("/proc").is_dir(), reason="looks for processes in /proc")
 def test_a_trial_whose_process_is_lost_goes_on(tmp_path):
     """By Ray: workers are killed outright as soon as an episode is finished."""
@@ -182,7 +183,8 @@ def test_a_trial_whose_process_is_lost_goes_on(tmp_path):
 
     def kill():
         while not killed and not over.wait(0.02):
-            if any(tmp_path.glob(f"sweep/{TRIALS}/*/evaluation/episodes.jsonl")):
+            files = tmp_path.glob(f"sweep/{TRIALS}/*/evaluation/episodes.jsonl")
+            if any(file.stat().st_size for file in files):
                 for process in workers_of_ray():
                     os.kill(process, signal.SIGKILL)
                     killed.append(process)
