@@ -39,7 +39,7 @@ SHOWN = {
 }  # fmt: skip
 # What is drawn of a learning curve, the first of these that it has: columns and what they are.
 CURVES = (
-    (("speed_mean_m_per_s", "validation_speed_m_per_s"), "speed [m/s]"),
+    (("top_speed", "validation_speed"), "speed over the script's"),
     (("return_mean",), "return"),
 )
 

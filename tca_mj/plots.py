@@ -214,11 +214,11 @@ def rollout_plot(
         if limit is not None:
             axis.axhline(limit, color="#c5221f", linewidth=1.1, linestyle=(0, (5, 3)))
             low, high = axis.get_ylim()
-            axis.set_ylim(low, max(high, limit + 0.08 * (limit - low)))
+            axis.set_ylim(low, max(high, limit + 0.12 * (limit - low)))
             axis.annotate(
                 f"limit {limit:g} {unit}", (1.0, limit), xycoords=("axes fraction", "data"),
-                xytext=(6, 0), textcoords="offset points", color="#c5221f", fontsize=9,
-                va="center",
+                xytext=(-6, 2), textcoords="offset points", color="#c5221f", fontsize=9,
+                ha="right", va="bottom",
             )
     axes[-1].set_xlabel("time [s]", fontsize=10)
     axes[0].set_xlim(start, start + span)
