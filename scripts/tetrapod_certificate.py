@@ -350,7 +350,11 @@ def walk(gait: Gait, angle: float, build: Callable[..., Part], seconds: float, t
     sim = Simulation(part, timestep=timestep, tca_period=0.02)
     used = tetrapod_scene(mjcf("ground.xml"), {}, SPEC, timestep=timestep, period=0.02).model
     sim.model.opt.cone, sim.model.opt.impratio = used.opt.cone, used.opt.impratio
-    sim.model.geom_solimp[sim.model.geom_priority > 0] = used.geom(f"robot.{LEGS[0]}.foot").solimp
+    for i in np.flatnonzero(sim.model.geom_priority > 0):  # the contacts of the tasks
+        foot = sim.model.geom(i).name.endswith(".foot")
+        like = used.geom(f"robot.{LEGS[0]}.foot" if foot else "robot.left.rail")
+        sim.model.geom_margin[i], sim.model.geom_solref[i] = like.margin[0], like.solref
+        sim.model.geom_solimp[i] = like.solimp
     bends = shape(sim.model)
     root = int(sim.model.jnt_qposadr[sim.model.joint("robot.root").id])
     feet = [sim.model.site(f"robot.{leg}.foot").id for leg in LEGS]
