@@ -171,6 +171,7 @@ def run_sweep(
 
     Raises:
         ImportError: If Ray is not installed.
+        ConnectionError: If there is no cluster at ``address``.
         RuntimeError: If trials ended in an error; what the others found is written.
         ValueError: If ``workers`` or ``failures`` is out of range.
     """
@@ -199,6 +200,7 @@ def _tune(
     trials: Sequence[Trial], out: Path, workers: int, address: str | None, failures: int
 ) -> dict[str, str]:
     """Lets Ray Tune run the trials; returns what went wrong, by the trial's point."""
+    os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")  # Ray would report its use otherwise
     import ray
     from ray import tune
 

@@ -594,7 +594,7 @@ def _sweep(arguments: argparse.Namespace) -> int:
     except ImportError as error:
         print(f"tca-mj sweep: {error}; pip install 'tca-mj[sweep]'", file=sys.stderr)
         return 2
-    except (FileNotFoundError, ValueError) as error:
+    except (ConnectionError, FileNotFoundError, ValueError) as error:
         print(f"tca-mj sweep: {error}", file=sys.stderr)
         return 2
     except RuntimeError as error:
