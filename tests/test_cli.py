@@ -13,6 +13,7 @@ import pytest
 
 from tca_mj import bench, bench_vector, cli, registry
 from tca_mj.agents import demo
+from tca_mj.cli.play import _policy
 from tca_mj.envs.arm import OBJECTS, ArmPickPlace
 from tca_mj.envs.viewer import NoDisplay, ViewerEnvironment, need_display
 
@@ -144,7 +145,7 @@ def test_the_viewer_steps_the_task_itself(
     monkeypatch.setenv("MUJOCO_GL", "disable")
     env = gym.make(TASK)
     shown = ViewerEnvironment(env, seed=2, options={"object": "pcb"})
-    act = cli._policy(policy, env, 2)
+    act = _policy(policy, env, 2)
     step = shown.reset()
     assert step.first()
     task = env.unwrapped

@@ -1,0 +1,98 @@
+"""What the files of the command share: its choices, the types of arguments, how one adds a command.
+
+An argument that its type refuses ends the program with code 2 and the reason.
+"""
+
+import argparse
+import os
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, TypeAlias
+
+from tca_mj.registry import TASKS
+
+TASK_IDS = tuple(task.id for task in TASKS)
+OBJECTS = ("screwdriver", "pcb")
+DEMOS = ("pick-and-place", "tetrapod")
+MODELS = ("used", "legs", "fine")
+POLICIES = ("scripted", "off", "random")
+ALGORITHMS = ("cma", "ppo", "sac", "td3")
+
+Commands: TypeAlias = "argparse._SubParsersAction[argparse.ArgumentParser]"
+
+
+def add_command(
+    commands: Commands,
+    name: str,
+    run: Callable[[argparse.Namespace], int],
+    *,
+    help: str,
+    text: str | None = None,
+) -> argparse.ArgumentParser:
+    """Adds a command, still without arguments.
+
+    Args:
+        commands: Where to.
+        name: What one types.
+        run: What it does with its arguments; returns the exit code.
+        help: One line for the list of commands.
+        text: What its own help says, line by line as it stands here; None for nothing.
+
+    Returns:
+        The parser of its arguments.
+    """
+    parser = commands.add_parser(
+        name, help=help, description=text, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.set_defaults(run=run)
+    return parser
+
+
+def parse_seed(text: str) -> int:
+    """A whole number of at least 0."""
+    if not text.strip().lstrip("-").isdecimal():
+        raise argparse.ArgumentTypeError(f"must be a whole number, got {text!r}")
+    value = int(text)
+    if value < 0:
+        raise argparse.ArgumentTypeError(f"must be at least 0, got {value}")
+    return value
+
+
+def parse_count(text: str) -> int:
+    """A whole number of at least 1."""
+    if parse_seed(text) < 1:
+        raise argparse.ArgumentTypeError(f"must be at least 1, got {text}")
+    return int(text)
+
+
+def parse_axis(text: str) -> tuple[str, tuple[Any, ...]]:
+    """A setting and its values, from ``NAME=VALUE,VALUE,...``; numbers where they are."""
+    name, _, values = text.partition("=")
+    if not name or not values:
+        raise argparse.ArgumentTypeError(f"must be NAME=VALUE,..., got {text!r}")
+
+    def value(part: str) -> float | int | str:
+        for kind in (int, float):
+            try:
+                return kind(part)
+            except ValueError:
+                continue
+        return part
+
+    return name, tuple(value(part) for part in values.split(","))
+
+
+def parse_folder(text: str) -> Path:
+    """A folder that one may write into, there or to be made."""
+    path = Path(text)
+    there = next((p for p in (path, *path.absolute().parents) if p.exists()), path)
+    if not there.is_dir():
+        raise argparse.ArgumentTypeError(f"must be a folder, {there} is a file")
+    if not os.access(there, os.W_OK):
+        raise argparse.ArgumentTypeError(f"must be a folder to write into, {there} is not")
+    return path
+
+
+def task_name(task: str) -> str:
+    """Name of a task's folder."""
+    return task.partition("/")[2].partition("-")[0]
