@@ -51,7 +51,7 @@ _RATIOS = ("energy_per_metre", "cost_of_transport")
 _LEVEL, _RESAMPLES = 0.95, 10_000
 
 # A finer leg. It has a plate at its root and behind each node, which together keep their mass.
-_FINE_LEG = {"leg.nodes": 10, "leg.motions": ("bend_x", "bend_y", "twist")}
+_FINE_LEG = {"leg.nodes": 10}
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -66,8 +66,8 @@ class Evaluation:
         randomise: Share by which the robot is off, as the task's option ``randomise`` (in the
             course ``randomise_robot`` as well); 0 is nominal.
         steps: Control steps after which an episode is over; None for the task's own limit.
-        model: ``used``; or, for the tetrapod's gaits, ``legs`` (ten nodes a leg, which twist, of
-            the same mass) or ``fine`` (those legs, and every spine a chain of its own).
+        model: ``used``; or, for the tetrapod's gaits, ``legs`` (ten nodes a leg, of the
+            same mass) or ``fine`` (those legs, and every spine an elastic chain of its own).
         timestep: Physics time step [s]; None for the task's own.
         design: Figures of the robot that differ from the default, see
             ``tca_mj.agents.design.robot_of``.
@@ -142,9 +142,11 @@ class Evaluation:
         more: dict[str, Any] = {} if self.timestep is None else {"timestep": self.timestep}
         design = dict(self.design)
         if self.model != "used":
-            more["fine"] = self.model == "fine"
             leg = designed(TetrapodSpec(), design).leg
-            design |= _FINE_LEG | ({"nodes": 6} if more["fine"] else {})
+            design |= _FINE_LEG
+            if self.model == "fine":
+                more["body"] = "fine"
+                design |= {"nodes": 6}
             design["leg.plate_fill"] = leg.plate_fill * (leg.nodes + 1) / 11.0
         more |= robot_of(self.task, design) if design else {}
         return gym.make(self.task, max_episode_steps=self.steps, **more)

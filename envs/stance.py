@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from tca_mj.model.part import Part
 from tca_mj.model.scene import scene
-from tca_mj.robots.tetrapod import LEGS, TetrapodSpec, tetrapod
+from tca_mj.robots.tetrapod import LEGS, TetrapodSpec, rigid_tetrapod, set_rigid_bend, tetrapod
 from tca_mj.robots.tetrapod_fine import fine_tetrapod
 from tca_mj.sim import Simulation
 
@@ -25,6 +25,8 @@ _VIEWS = {
     "side": ((0.0, -0.45, 0.04), (0.0, 0.0, -0.01)),
 }
 CAMERAS = tuple(_VIEWS)
+
+BODIES = ("rigid", "elastic", "fine")
 
 # A foot of 0.3 g is pushed and pulled by forces that accelerate it by 200 m/s². Where contacts are
 # so stiff that it rests at no depth, it loses the ground for single time steps, falls a millimetre
@@ -53,7 +55,8 @@ def tetrapod_scene(
     *,
     timestep: float,
     period: float,
-    fine: bool = False,
+    body: str = "elastic",
+    bend: float = 0.0,
 ) -> Simulation:
     """The robot ``robot`` in an arena, with contacts that suit its light feet and with ``CAMERAS``.
 
@@ -63,18 +66,23 @@ def tetrapod_scene(
         spec: The robot.
         timestep: Physics time step [s].
         period: Time between two updates of the TCAs [s].
-        fine: Whether each spine is a chain of its own and the legs twist, see ``fine_tetrapod``.
+        body: One of ``BODIES``: ``rigid``, cold and of one shape (``rigid_tetrapod``);
+            ``elastic``, the spines in one chain, which heat softens (``tetrapod``); or ``fine``,
+            each spine a chain of its own (``fine_tetrapod``).
+        bend: Bend for which a rigid one is built [rad].
 
     Raises:
         ValueError: If a file is missing, a time is bad or the robot cannot be built.
     """
-    if fine:
+    if body not in BODIES:
+        raise ValueError(f"body must be one of {list(BODIES)}, got {body!r}")
+    if body == "fine":
         robot = fine_tetrapod(spec, nodes=spec.nodes, leg_nodes=spec.leg.nodes)
     else:
-        robot = tetrapod(spec)
+        robot = tetrapod(spec) if body == "elastic" else rigid_tetrapod(spec, bend=bend)
     part = scene(arena, robot, objects, name="robot")
     _soften(part)
-    if fine:  # its welds are harder than MuJoCo takes them otherwise
+    if body == "fine":  # its welds are harder than MuJoCo takes them otherwise
         part.spec.option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_REFSAFE)
     hub = part.spec.body("robot.hub")
     for name, (place, towards) in _VIEWS.items():
@@ -128,11 +136,13 @@ class Stance:
                 [model.jnt_qposadr[model.joint(name).id] for name in names], dtype=np.int64
             )
 
-        sides = {"left": -1.0, "right": 1.0}
+        joints = [model.joint(i).name for i in range(model.njnt)]
+        self._nodes, self._rigid = spec.nodes, "robot.left.bend_x0" not in joints
+        self._bend = 0.0  # of a rigid body
+        sides = {} if self._rigid else {"left": -1.0, "right": 1.0}
         spine = {s: [f"robot.{s}.bend_x{i}" for i in range(spec.nodes)] for s in sides}
         self._bends = address([name for names in spine.values() for name in names])
         self._signs = np.repeat(list(sides.values()), spec.nodes)
-        joints = [model.joint(i).name for i in range(model.njnt)]
         # Spines of the fine model that run beside the middle one, from the right rail to the left.
         beside = [name for name in joints if name.startswith("robot.outer") and ".bend_x" in name]
         self._beside = address(beside)
@@ -145,7 +155,7 @@ class Stance:
 
     def bend(self, data: mujoco.MjData) -> float:
         """Angle between the ends of the spines, 0 if they are straight [rad]."""
-        return float(self._signs @ data.qpos[self._bends])
+        return self._bend if self._rigid else float(self._signs @ data.qpos[self._bends])
 
     def position(self, data: mujoco.MjData) -> Array:
         """Of the hub in the world, shape (3,) [m]."""
@@ -197,8 +207,11 @@ class Stance:
         """
 
         def place(data: mujoco.MjData) -> None:
-            data.qpos[self._bends] = self._signs * bend / len(self._bends)
-            data.qpos[self._beside] = -bend / len(self._bends)
+            if self._rigid:
+                self._bend = bend
+                set_rigid_bend(self._model, bend, prefix="robot.")
+            data.qpos[self._bends] = self._signs * bend / (2 * self._nodes)
+            data.qpos[self._beside] = -bend / (2 * self._nodes)
             turn = (math.cos(yaw / 2.0), 0.0, 0.0, math.sin(yaw / 2.0))
             data.qpos[self._q : self._q + 7] = (*position, above, *turn)
 
@@ -209,7 +222,8 @@ class Stance:
                 mujoco.mj_kinematics(self._model, data)
                 mujoco.mj_collision(self._model, data)
                 contact = data.contact
-                near = contact.dist < 0.5 * contact.includemargin  # about as deep as it will rest
+                # About as deep as it will rest: a foot halfway in its layer, all else at 0.
+                near = contact.dist < 0.6 * (contact.includemargin - _MARGIN)
                 steep = np.abs(contact.frame[:, 2]) > 0.5
                 return bool((near & steep).any()), bool((near & ~steep).any())
 

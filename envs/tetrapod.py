@@ -57,8 +57,9 @@ TASKS = {
     # Sun's crawling robot is "almost flat": it keeps the memorised shape.
     "crawl": GaitTask(bend=TetrapodSpec().memory_angle, speed=2.4e-3),
     "walk": GaitTask(bend=math.radians(93.0), speed=9e-3),
-    # Sun's U shape has no number. Estimate: the feet press against the beam and can leave it.
-    "shimmy": GaitTask(bend=math.radians(206.0), speed=0.75e-3, beam=0.12, yaw_range=0.005),
+    # Sun prints neither the angle of the U nor the beam. Both (the beam in beam.xml, 34 mm wide)
+    # are chosen so that legs press the beam while they are nearly straight: bent, they twist.
+    "shimmy": GaitTask(bend=math.radians(215.0), speed=0.75e-3, beam=0.12, yaw_range=0.005),
 }
 
 _SETTLING = 0.5  # time in which the robot comes to rest after it is put down [s]
@@ -119,7 +120,7 @@ class TetrapodGait(SimulatedTask):
         gait: str = "walk",
         render_mode: str | None = None,
         robot: TetrapodSpec | None = None,
-        fine: bool = False,
+        body: str = "rigid",
         timestep: float = 5e-3,
         camera: str = "follow",
         size: tuple[int, int] = (960, 720),
@@ -130,9 +131,9 @@ class TetrapodGait(SimulatedTask):
             gait: ``crawl``, ``walk`` or ``shimmy``.
             render_mode: None or ``"rgb_array"``.
             robot: The robot, by default the published one as far as it is known.
-            fine: Whether each spine is a chain of its own and the legs twist, as in the model that
-                certifies this one (``tca_mj.robots.tetrapod_fine``). It asks for a time step of
-                2 ms: with a longer one its contacts are harder than those of the other model.
+            body: One of ``tca_mj.envs.stance.BODIES``. The body is cold: ``rigid`` is all that its
+                gaits need. ``elastic`` and ``fine`` have the spines' springs, heaters and TCAs and
+                say what rigidity leaves out; with ``fine`` the legs are as the robot's, too.
             timestep: Physics time step, of which ``control_period`` is a multiple [s].
             camera: Camera of the pictures, one of ``CAMERAS``; all follow the robot.
             size: Width and height of the pictures [pixels].
@@ -153,7 +154,8 @@ class TetrapodGait(SimulatedTask):
             self.robot,
             timestep=timestep,
             period=self.control_period,
-            fine=fine,
+            body=body,
+            bend=self.task.bend,
         )
         self.stance = Stance(self.sim, self.robot)
         self.observation_space = OBSERVATION.space
@@ -161,7 +163,9 @@ class TetrapodGait(SimulatedTask):
         self._nominal = Nominal(self.sim)
         self._forward = np.array([1.0, 0.0])
         self._start = np.zeros(3)
+        self._along, self._aside = 0.0, 0.0
         self._progress = self._judge()
+        self._varied = asdict(self.variation)
 
     @property
     def variation(self) -> Variation:
@@ -179,6 +183,7 @@ class TetrapodGait(SimulatedTask):
         super().reset(seed=seed)
         setup = self._setup(options or {})
         self._nominal.apply(setup["variation"])
+        self._varied = asdict(self.variation)
         self.sim.reset(
             self.stance.placer(bend=setup["bend"], yaw=setup["yaw"], above=self.task.beam or 0.0)
         )
@@ -266,14 +271,15 @@ class TetrapodGait(SimulatedTask):
 
     def _judge(self) -> dict[str, float]:
         """How far the robot has got, by reward term."""
-        along, aside = self._travelled()
-        return {"progress": along / self.task.speed, "drift": -0.5 * abs(aside) / self.task.speed}
-
-    def _travelled(self) -> tuple[float, float]:
-        """Distances from the start along the commanded direction and to the left of it [m]."""
-        moved = (self.stance.position(self.data) - self._start)[:2]
-        x, y = self._forward
-        return float(moved @ (x, y)), float(moved @ (-y, x))
+        x, y, _ = (self.stance.position(self.data) - self._start).tolist()
+        forward_x, forward_y = self._forward.tolist()
+        # Distances from the start along the commanded direction and to the left of it [m].
+        self._along = forward_x * x + forward_y * y
+        self._aside = forward_x * y - forward_y * x
+        return {
+            "progress": self._along / self.task.speed,
+            "drift": -0.5 * abs(self._aside) / self.task.speed,
+        }
 
     def _fallen(self, tilt: float) -> str | None:
         """How the robot has fallen, or None."""
@@ -318,17 +324,16 @@ class TetrapodGait(SimulatedTask):
 
     def _info(self) -> dict[str, Any]:
         sim = self.sim
-        along, aside = self._travelled()
         return {
-            "distance": along,
-            "drift": aside,
-            "speed": along / sim.time if sim.time > 0.0 else 0.0,
+            "distance": self._along,
+            "drift": self._aside,
+            "speed": self._along / sim.time if sim.time > 0.0 else 0.0,
             "time": sim.time,
             "energy": sim.energy.copy(),
             "heater_energy": sim.spines.energy.copy(),
             "temperature": sim.temperature.copy(),
             "tension": sim.tension.copy(),
-            "variation": asdict(self.variation),
+            "variation": self._varied.copy(),
         }
 
 

@@ -13,15 +13,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tca_mj.agents.course import CourseWalker
-from tca_mj.assets import mjcf
+from tca_mj.agents.tetrapod_gaits import GaitPolicy
 from tca_mj.envs.course import TetrapodCourse
-from tca_mj.model.scene import scene
+from tca_mj.envs.tetrapod import TetrapodGait
 from tca_mj.render import Offscreen, colour_tendons
-from tca_mj.robots.tetrapod import TetrapodSpec, tetrapod
 from tca_mj.sim import Simulation
 
-# Bend of the body [deg] and height of its middle over the ground [m].
-SHAPES = ((20.0, 0.013), (95.0, 0.073), (180.0, 0.108))
+# Time at which a gait is seen [s], distance of the camera, height of what it looks at over the
+# middle of the robot [m].
+SHAPES = {"crawl": (5.0, 0.42, 0.03), "walk": (4.5, 0.42, -0.03), "shimmy": (8.5, 0.36, -0.05)}
 # Time after the start of each stage at which its picture is taken [s].
 MOMENTS = {"crawl": 50.0, "stand up": 14.0, "walk": 12.0, "mount": 20.0, "clamp": 45.0,
            "shimmy": 45.0, "open": 100.0, "walk on": 25.0}  # fmt: skip
@@ -46,21 +46,16 @@ def picture(sim: Simulation, camera: mujoco.MjvCamera, size: tuple[int, int]) ->
 
 
 def shapes(out: Path) -> None:
-    """Flat, at 90° and as a U, as the robot stands on a table."""
-    spec, frames = TetrapodSpec(), []
-    sim = Simulation(scene(mjcf("arena.xml"), tetrapod(spec), {}, name="robot"), timestep=5e-3)
-    for angle, height in SHAPES:
-
-        def place(data: mujoco.MjData, angle: float = angle, height: float = height) -> None:
-            data.qpos[2] = height
-            for side, sign in (("left", -1.0), ("right", 1.0)):
-                for node in range(spec.nodes):
-                    joint = sim.model.joint(f"robot.{side}.bend_x{node}")
-                    data.qpos[joint.qposadr[0]] = sign * np.radians(angle) / (2 * spec.nodes)
-
-        sim.reset(place)
-        sim.step(np.zeros(sim.n), 1.0)
-        frames.append(picture(sim, view(sim.model, 0.0, 0.42, 152.0, -14.0, 0.045), (560, 480)))
+    """Crawling, walking and clamping a beam, as in the tasks of single gaits."""
+    frames = []
+    for gait, (seconds, distance, up) in SHAPES.items():
+        env, policy = TetrapodGait(gait=gait), GaitPolicy.of(gait)
+        observation, _ = env.reset(seed=0)
+        for _ in range(round(seconds / env.control_period)):
+            observation, *_ = env.step(policy.act(observation))
+        x, _, z = env.stance.position(env.data)
+        camera = view(env.model, float(x), distance, 152.0, -14.0, float(z) + up)
+        frames.append(picture(env.sim, camera, (560, 480)))
     imageio.imwrite(out / "tetrapod.png", np.concatenate(frames, axis=1))
 
 

@@ -123,7 +123,7 @@ class Spines:
                 raise ValueError(f"{name} must have shape ({self.n},), got {shape}")
         if not np.isfinite(voltage).all():
             raise ValueError(f"voltage must be finite, got {voltage}")
-        return np.broadcast_to(voltage, self.n), np.broadcast_to(fan, self.n)
+        return np.full(self.n, voltage), np.full(self.n, fan)
 
     def advance(
         self,

@@ -16,6 +16,7 @@ from tca_mj.tca import CATALOGUE, TcaSpec
 CARBON_YOUNG = 130e9  # pultruded carbon-fibre rod along its fibres; estimate from data sheets [Pa]
 CARBON_SHEAR = 4.5e9  # the same, in shear along the fibres; estimate [Pa]
 CARBON_DENSITY = 1550.0  # the same; estimate [kg/m³]
+_SIDE = 0.9  # share of a plate's side that its capsule fills; the ends close the corner
 PRINTED_DENSITY = 1200.0  # printed resin and PLA, solid; estimate [kg/m³]
 
 
@@ -42,7 +43,9 @@ class LegSpec:
             varnished desk.
         damping_time: Kelvin-Voigt time of the leg [s]. Estimate: the TCAs' loss, as the rod has
             almost none.
-        nodes: Nodes of the chain, each with two bending hinges and a plate behind it.
+        motions: Motions of each node. Without twist a foot under load is off by millimetres.
+        nodes: Nodes of the chain, each with a plate behind it. Three that twist are off by less
+            than 1 % of the length under any load of a gait.
         tca: The kind of TCA, cut to the leg's length.
 
     Raises:
@@ -63,8 +66,8 @@ class LegSpec:
     friction: float = 0.8
     plate_friction: float = 0.3
     damping_time: float = 20e-3
-    motions: tuple[Motion, ...] = ("bend_x", "bend_y")
-    nodes: int = 5
+    motions: tuple[Motion, ...] = ("bend_x", "bend_y", "twist")
+    nodes: int = 3
     tca: TcaSpec = field(default_factory=lambda: CATALOGUE["free-stroke"])
 
     def __post_init__(self) -> None:
@@ -166,10 +169,14 @@ def _dress(chain: Chain, spec: LegSpec) -> None:
         )  # fmt: skip
         for side in range(spec.count):  # a frame with the TCAs' holes in its corners
             angles = [spec.phase + 2.0 * math.pi * (side + k) / spec.count for k in (0, 1)]
-            ends = [[spec.offset * math.cos(a), spec.offset * math.sin(a), middle] for a in angles]
+            first, last = (
+                [spec.offset * math.cos(a), spec.offset * math.sin(a), middle] for a in angles
+            )
+            # It ends before the next side begins, so that a corner has one contact, not two.
+            last = [a + _SIDE * (b - a) for a, b in zip(first, last, strict=True)]
             piece.add_geom(
                 name=f"plate{number}.{side}", type=mujoco.mjtGeom.mjGEOM_CAPSULE,
-                fromto=[*ends[0], *ends[1]], size=[spec.plate_thickness, 0.0, 0.0],
+                fromto=[*first, *last], size=[spec.plate_thickness, 0.0, 0.0],
                 mass=spec.plate_mass / spec.count, rgba=[0.93, 0.55, 0.15, 1.0],
                 condim=3, **_touching(spec.plate_friction),
             )  # fmt: skip

@@ -51,7 +51,6 @@ class TetrapodSpec:
             flat", Sun, Section 6.3.2.
         rail_length: Length of a rail [m]. Sun: the robot is about 150 mm long.
         rail_width: Extent of a rail across the body [m]. Estimate.
-        rail_height: Height of a rail [m]. Estimate.
         rail_mass: Mass of a rail with the sockets of its legs [kg]. Estimate.
         leg_station: Fore-aft distance of a leg's root from the middle [m]. Estimate.
         leg_height: Height of a leg's root above the spines' plane [m]. Estimate: flat, the robot is
@@ -74,7 +73,6 @@ class TetrapodSpec:
     memory_angle: float = math.radians(20.0)
     rail_length: float = 150e-3
     rail_width: float = 6e-3
-    rail_height: float = 5e-3
     rail_mass: float = 3e-3
     leg_station: float = 62e-3
     leg_height: float = 6e-3
@@ -85,7 +83,7 @@ class TetrapodSpec:
         require_positive(
             **{name: getattr(self, name) for name in (
                 "tca_capacity", "module_mass", "spacing", "rail_length", "rail_width",
-                "rail_height", "rail_mass", "leg_station", "leg_height", "belly_friction",
+                "rail_mass", "leg_station", "leg_height", "belly_friction",
             )}
         )  # fmt: skip
         require_count(nodes=self.nodes)
@@ -131,17 +129,8 @@ def tetrapod(spec: TetrapodSpec | None = None) -> Part:
         ValueError: If the geometry cannot be built.
     """
     spec = spec or TetrapodSpec()
-    mjspec = new_spec("tetrapod")
-    hub = mjspec.worldbody.add_body(name="hub")
-    hub.add_freejoint(name="root")
-    part = Part(mjspec)
-    halves = {}
-    for side, sign in SIDES.items():
-        halves[side] = add_half(
-            hub, spec, side, count=SPINES, nodes=spec.nodes, motions=("bend_x", "twist")
-        )
-        dress(halves[side], spec, down=sign, places=dict(enumerate(spec.places)))
-        add_rail(halves[side], spec, sign)
+    part, halves = trunk(spec, count=SPINES, nodes=spec.nodes, motions=("bend_x", "twist"))
+    mjspec = part.spec
     attach_legs(part, spec.leg)
     torsion = 2 * lumped_torsion(spec.spine, spec.places, 2 * spec.nodes)[spec.nodes :]
     for i, x in enumerate(spec.places):
@@ -155,7 +144,87 @@ def tetrapod(spec: TetrapodSpec | None = None) -> Part:
     return part
 
 
-def add_half(
+def rigid_tetrapod(
+    spec: TetrapodSpec | None = None, *, bend: float = 0.0, nodes: int = 8
+) -> Part:
+    """Builds the robot of ``tetrapod`` with cold spines: its body is rigid, its legs alone move.
+
+    Cold, the three spines give by 1.8 rad/(N m): the moments of the legs bend them by less than
+    half a degree. The heaters have nothing to do and are left out; of the spines' TCAs there is
+    only what is seen and what they weigh.
+
+    Args:
+        spec: The robot.
+        bend: Bend of the body from rail to rail, which ``set_rigid_bend`` changes [rad].
+        nodes: Nodes of each half of the spines. They move nothing, so that more than an elastic
+            body has cost little; what rests on a beam's edges touches a surface that is rounder.
+
+    Returns:
+        A part with the TCAs and sites of the legs of ``tetrapod``, and the same bodies.
+
+    Raises:
+        ValueError: If the geometry cannot be built.
+    """
+    spec = spec or TetrapodSpec()
+    part, halves = trunk(spec, count=SPINES, nodes=nodes, motions=("bend_x",))
+    mjspec = part.spec
+    for side, chain in halves.items():
+        for piece, joints in zip(chain.pieces[1:], chain.joints, strict=True):
+            mjspec.delete(mjspec.joint(joints["bend_x"]))
+            piece.quat = _bent(bend, SIDES[side], nodes)
+    attach_legs(part, spec.leg)
+    for i, x in enumerate(spec.places):  # their TCAs are seen and have a mass
+        tca = route_spine_tca(mjspec, halves, spec, x, f"spine{i}")
+        mjspec.delete(mjspec.actuator(tca.name))
+    return part
+
+
+def set_rigid_bend(model: mujoco.MjModel, bend: float, *, prefix: str = "") -> None:
+    """Gives the body of a compiled ``rigid_tetrapod`` another bend.
+
+    Args:
+        model: The model.
+        bend: Bend from rail to rail [rad].
+        prefix: What stands before the robot's names in ``model``.
+    """
+    names = [model.body(i).name for i in range(model.nbody)]
+    for side, sign in SIDES.items():
+        pieces = [i for i, name in enumerate(names) if name.startswith(f"{prefix}{side}.piece")]
+        model.body_quat[pieces[1:]] = _bent(bend, sign, len(pieces) - 1)
+
+
+def _bent(bend: float, sign: float, nodes: int) -> tuple[float, float, float, float]:
+    """Turn of one node of a half that is bent as a part of the whole, wxyz."""
+    half = -sign * bend / (4.0 * nodes)
+    return math.cos(half), math.sin(half), 0.0, 0.0
+
+
+def trunk(
+    spec: TetrapodSpec, *, count: int, nodes: int, motions: Sequence[Motion]
+) -> tuple[Part, dict[str, Chain]]:
+    """The free hub, two halves of the spines from there on, and the rails at their ends.
+
+    Args:
+        spec: The robot.
+        count: How many spines the halves stand for, all or the middle one.
+        nodes: Nodes of each half.
+        motions: Motions of each node.
+
+    Returns:
+        The part, and its halves by their sides.
+    """
+    part, places = Part(new_spec("tetrapod")), dict(enumerate(spec.places))
+    hub = part.spec.worldbody.add_body(name="hub")
+    hub.add_freejoint(name="root")
+    halves = {}
+    for side, sign in SIDES.items():
+        halves[side] = _half(hub, spec, side, count=count, nodes=nodes, motions=motions)
+        add_rail(halves[side], spec, sign)
+    dress_halves(halves, spec, places if count == SPINES else {SPINES // 2: 0.0})
+    return part, halves
+
+
+def _half(
     hub: mujoco.MjsBody,
     spec: TetrapodSpec,
     side: str,
@@ -186,7 +255,23 @@ def attach_legs(part: Part, leg: LegSpec) -> None:
     part.tcas = tuple(sorted(part.tcas, key=lambda tca: order[tca.name.split(".")[0]]))
 
 
-def dress(chain: Chain, spec: TetrapodSpec, *, down: float, places: Mapping[int, float]) -> None:
+def dress_halves(
+    halves: Mapping[str, Chain], spec: TetrapodSpec, places: Mapping[int, float]
+) -> None:
+    """``dress`` for both halves. What they have in common, on the hub, is one thing to touch."""
+    for side, sign in SIDES.items():
+        common = halves[side].piece / 2.0 * sign
+        dress(halves[side], spec, down=sign, places=places, behind=common)
+
+
+def dress(
+    chain: Chain,
+    spec: TetrapodSpec,
+    *,
+    down: float,
+    places: Mapping[int, float],
+    behind: float = 0.0,
+) -> None:
     """What of spines is seen and touched, tube below and polymer above.
 
     Args:
@@ -194,21 +279,27 @@ def dress(chain: Chain, spec: TetrapodSpec, *, down: float, places: Mapping[int,
         spec: The robot.
         down: 1 if the chain's y axis points down, -1 if up.
         places: x in the chain of each spine, by its number [m].
+        behind: How far the first piece reaches behind the chain's root; minus its length leaves
+            it out [m].
     """
     size, tube = spec.spine, spec.spine.module_height - spec.spine.thickness
     for number, piece in enumerate(chain.pieces):
-        whole = chain.piece * (0.5 if number in (0, chain.nodes) else 1.0)
+        end = chain.piece * (0.5 if number in (0, chain.nodes) else 1.0)
+        begin = 0.0 if number else -behind
+        half, middle = (end - begin) / 2.0, (end + begin) / 2.0
+        if half <= 0.0:
+            continue
         for i, x in places.items():
             piece.add_geom(
                 name=f"{chain.name}.spine{i}.{number}", type=mujoco.mjtGeom.mjGEOM_BOX,
-                pos=[x, 0.0, whole / 2.0],
-                size=[size.width / 2.0, size.thickness / 2.0, whole / 2.0],
+                pos=[x, 0.0, middle],
+                size=[size.width / 2.0, size.thickness / 2.0, half],
                 mass=0.0, rgba=[0.86, 0.78, 0.52, 1.0], **_touching(spec.belly_friction),
             )  # fmt: skip
             piece.add_geom(
                 name=f"{chain.name}.tube{i}.{number}", type=mujoco.mjtGeom.mjGEOM_BOX,
-                pos=[x, down * spec.spine.module_height / 2.0, whole / 2.0],
-                size=[size.width / 2.0, tube / 2.0, whole / 2.0],
+                pos=[x, down * spec.spine.module_height / 2.0, middle],
+                size=[size.width / 2.0, tube / 2.0, half],
                 mass=0.0, rgba=[0.9, 0.9, 0.88, 0.6], **_touching(spec.belly_friction),
             )  # fmt: skip
 
@@ -223,13 +314,19 @@ def _touching(friction: float) -> dict[str, Any]:
 
 
 def add_rail(chain: Chain, spec: TetrapodSpec, sign: float) -> None:
-    """A rail at the end of a half, with the sites ``<side>.front`` and ``<side>.rear`` for legs."""
+    """A rail at the end of a half, with the sites ``<side>.front`` and ``<side>.rear`` for legs.
+
+    It is as high as the modules that it holds and flush with them, so that what lies on it is not
+    carried by their tubes as well.
+    """
     tip, end = chain.tip, chain.local(chain.nodes)
     middle, up = end + spec.rail_width / 2.0, -sign  # of the chain's y axis
+    height = spec.spine.module_height
+    low = -up * (height - spec.spine.thickness) / 2.0  # of the modules' middle
     grey = [0.25, 0.3, 0.36, 1.0]
     tip.add_geom(
-        name=f"{chain.name}.rail", type=mujoco.mjtGeom.mjGEOM_BOX, pos=[0.0, 0.0, middle],
-        size=[spec.rail_length / 2.0, spec.rail_height / 2.0, spec.rail_width / 2.0],
+        name=f"{chain.name}.rail", type=mujoco.mjtGeom.mjGEOM_BOX, pos=[0.0, low, middle],
+        size=[spec.rail_length / 2.0, height / 2.0, spec.rail_width / 2.0],
         mass=spec.rail_mass, rgba=grey, **_touching(spec.belly_friction),
     )  # fmt: skip
     # The leg's z axis points outwards, x up.
@@ -238,7 +335,7 @@ def add_rail(chain: Chain, spec: TetrapodSpec, sign: float) -> None:
         tip.add_geom(
             name=f"{chain.name}.{place}.socket", type=mujoco.mjtGeom.mjGEOM_BOX,
             pos=[x, up * spec.leg_height / 2.0, middle],
-            size=[4e-3, (spec.leg_height + spec.rail_height) / 2.0, spec.rail_width / 2.0],
+            size=[4e-3, (spec.leg_height + height) / 2.0, spec.rail_width / 2.0],
             contype=0, conaffinity=0, mass=0.0, rgba=grey,
         )  # fmt: skip
         tip.add_site(

@@ -12,18 +12,16 @@ import mujoco
 import numpy as np
 
 from tca_mj.model.chain import MOTIONS, Chain, Motion, beam
-from tca_mj.model.part import Part, new_spec
+from tca_mj.model.part import Part
 from tca_mj.model.spine import route_spine
 from tca_mj.model.tendon import route_passes, route_tca
 from tca_mj.robots.tetrapod import (
-    SIDES,
     TetrapodSpec,
-    add_half,
-    add_rail,
     attach_legs,
     dress,
     route_spine_tca,
     sheathed,
+    trunk,
 )
 from tca_mj.routes import UTurn
 
@@ -52,16 +50,9 @@ def fine_tetrapod(spec: TetrapodSpec | None = None, *, nodes: int = 6, leg_nodes
         ValueError: If the geometry cannot be built.
     """
     spec = spec or TetrapodSpec()
-    mjspec = new_spec("tetrapod")
-    hub = mjspec.worldbody.add_body(name="hub")
-    hub.add_freejoint(name="root")
-    halves = {}
-    for side, sign in SIDES.items():
-        halves[side] = add_half(hub, spec, side, count=1, nodes=nodes, motions=MOTIONS)
-        dress(halves[side], spec, down=sign, places={1: 0.0})
-        add_rail(halves[side], spec, sign)
+    part, halves = trunk(spec, count=1, nodes=nodes, motions=MOTIONS)
+    mjspec = part.spec
     outer = {i: _outer(mjspec, halves, spec, i) for i in (0, 2)}
-    part = Part(mjspec)
     attach_legs(part, replace(spec.leg, nodes=leg_nodes, motions=_LEG_MOTIONS))
     for i in range(len(spec.places)):
         name = f"spine{i}"
