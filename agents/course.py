@@ -13,12 +13,15 @@ from numpy.typing import NDArray
 
 from tca_mj.agents.tetrapod_gaits import CRAWL, SHIMMY, WALK
 from tca_mj.control import Gait, Thermostat
-from tca_mj.envs.course import ACTION, OBSERVATION, Places, TetrapodCourse
+from tca_mj.envs.course import OBSERVATION, Places, TetrapodCourse
 
 Array = NDArray[np.float64]
 
 PUSH = replace(WALK, offset=(0.0,) * 4)
 """The walk with both legs of a pair together, where the body does not rest on its legs."""
+
+HURRY = replace(SHIMMY, period=11.5, hot=(170.0, 150.0, 170.0))
+"""The shimmy with stronger strokes: the beam is wider than the one of its task."""
 
 STEP = Gait(
     period=4.0, offset=(0.0, 0.5, 0.5, 0.0), start=(0.0, 0.5, 0.5), duty=(0.5,) * 3,
@@ -65,6 +68,7 @@ class Bend:
         steps: Gait of the legs while the body bends, so that friction does not hold it.
         braced: Whether the legs curl inwards from beginning to end, which opens the body.
         reaching: Whether the rear legs reach forward while the body is soft, clear of the desk.
+        enough: Bend up to which the stage is left out; None: never [rad].
     """
 
     name: str
@@ -72,6 +76,7 @@ class Bend:
     steps: Gait | None = None
     braced: bool = False
     reaching: bool = False
+    enough: float | None = None
 
 
 def stages(places: Places) -> tuple[Go | Bend, ...]:
@@ -88,18 +93,20 @@ def stages(places: Places) -> tuple[Go | Bend, ...]:
             name="mount", gait=PUSH, until=places.first_edge + station + 0.004, patience=25.0,
             steers=0.0,
         ),  # fmt: skip
-        Bend(name="clamp", angle=np.radians(208.0), reaching=True),
-        Go(name="shimmy", gait=SHIMMY, until=places.beam_end - 0.005, patience=120.0),
-        # On until the rear spine has left the beam; the front legs, on the desk by then, are cold.
+        Bend(name="clamp", angle=np.radians(213.0), reaching=True),
+        Go(name="shimmy", gait=HURRY, until=places.beam_end - 0.005, patience=120.0),
+        # On until the rear spine has left the beam; the front legs clamp its lower end by then.
         Go(
-            name="step off", gait=SHIMMY, until=places.beam_end + station - 0.015, patience=60.0,
-            pushes=(False, False, True, True),
+            name="step off", gait=HURRY, until=places.beam_end + station - 0.015, patience=60.0,
         ),  # fmt: skip
         # As wide each time as curled legs can open it; between, the legs stretch.
         *(
-            Bend(name="open", angle=np.radians(angle), steps=STEP, braced=True)
-            for angle in (165.0, 130.0, 97.0)
-        ),
+            Bend(
+                name="open", angle=np.radians(angle), steps=STEP, braced=True,
+                enough=np.radians(115.0),
+            )
+            for angle in (165.0, 130.0, 97.0, 97.0, 97.0)
+        ),  # fmt: skip
         Go(name="walk on", gait=WALK, until=places.target, steers=0.0),
         Bend(name="lie down", angle=None),
     )
@@ -147,7 +154,7 @@ class CourseWalker:
     def act(self, observation: NDArray[np.float32]) -> NDArray[np.float32]:
         """The next action."""
         seen = OBSERVATION.read(observation)
-        if self._number < len(self._plan) and self._over(seen):
+        while self._number < len(self._plan) and self._over(seen):
             self._number += 1
             self._enter()
         legs, spines, voltage = np.full((4, 3), _OFF), _OFF, np.zeros(3)
@@ -161,7 +168,7 @@ class CourseWalker:
         target = np.concatenate([np.maximum(legs, 25.0).ravel(), np.full(3, spines)])
         power = self._thermostat.power(seen["TCA temperature"], target)
         action = np.concatenate([power / self._max_power, voltage / self._voltage])
-        return (2.0 * action - 1.0).astype(ACTION.space.dtype)
+        return (2.0 * action - 1.0).astype(np.float32)
 
     def _over(self, seen: dict[str, Array]) -> bool:
         stage = self._plan[self._number]
@@ -170,6 +177,8 @@ class CourseWalker:
             if x > self._best + 2e-3:
                 self._best, self._since = x, self._time
             return x >= stage.until or self._time - self._since > stage.patience
+        if stage.enough is not None and self._time == 0.0:
+            return float(seen["body angle"][0]) <= stage.enough
         return self._part == "done"
 
     def _walk(self, stage: Go, seen: dict[str, Array]) -> Array:

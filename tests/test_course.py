@@ -10,7 +10,18 @@ import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
 
-from tca_mj.agents.course import CRAWL, PUSH, SHIMMY, STEP, WALK, Bend, CourseWalker, Go, stages
+from tca_mj.agents.course import (
+    CRAWL,
+    HURRY,
+    PUSH,
+    SHIMMY,
+    STEP,
+    WALK,
+    Bend,
+    CourseWalker,
+    Go,
+    stages,
+)
 from tca_mj.agents.demo import tetrapod_course
 from tca_mj.cli import outcome, speed_table
 from tca_mj.envs.course import ACTION, OBSERVATION, TetrapodCourse
@@ -233,7 +244,7 @@ def test_the_course_file_and_the_plan_agree(shared):
     assert ends == sorted(ends)
     assert isinstance(plan[-1], Bend) and plan[-1].angle is None
     limit = TetrapodCourse.max_temperature
-    for gait in (CRAWL, WALK, PUSH, SHIMMY, STEP):
+    for gait in (CRAWL, WALK, PUSH, SHIMMY, HURRY, STEP):
         assert gait.temperature(np.linspace(0.0, 1.0, 101)).max() < limit
 
 
@@ -251,6 +262,17 @@ def test_curled_legs_open_the_body(friction):
         assert env.sim.time < 30.0
     assert 155.0 < np.degrees(env.body_angle) < 182.0
     assert abs(env.position[1]) < 0.025 and not env.sim.spines.damaged.any()
+
+
+@pytest.mark.parametrize(("degrees", "stage"), [(110.0, "walk on"), (120.0, "open")])
+def test_a_body_that_is_open_is_not_opened_again(degrees, stage):
+    env = TetrapodCourse()
+    env.reset(seed=0)
+    bent(env, np.radians(degrees), env.places.beam_end + 0.047, 0.04)
+    walker = CourseWalker(env)
+    walker._number = [each.name for each in walker._plan].index("open")
+    walker.act(env._observe())
+    assert walker.phase == stage
 
 
 def test_the_crawl_goes_forward_and_the_walk_is_faster():
