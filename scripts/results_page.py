@@ -70,6 +70,7 @@ One's own policy is measured by `tca-mj eval POLICY --task TASK`, with `--random
 `--timestep`; `tca-mj demo --policy POLICY --task TASK` films it.
 """
 
+
 def cases(tasks: list[str]) -> Iterator[tuple[str, str, str, Evaluation]]:
     """Task, policy and condition, with what is to be run."""
     for task in tasks:

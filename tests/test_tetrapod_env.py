@@ -491,7 +491,7 @@ def test_the_walk_does_not_hang_on_the_time_step():
     assert distance[0] == pytest.approx(distance[1], rel=0.1)
 
 
-@pytest.mark.parametrize(("gait", "steps"), [("walk", 90), ("shimmy", 150)])
+@pytest.mark.parametrize(("gait", "steps"), [("crawl", 90), ("walk", 90), ("shimmy", 150)])
 def test_feet_land_without_sinking_in(envs, gait, steps, monkeypatch):
     """In no time step is a contact deeper than 0.3 mm, also where legs snap onto the beam."""
     step, depths = mujoco.mj_step, []

@@ -149,9 +149,9 @@ def rigid_tetrapod(
 ) -> Part:
     """Builds the robot of ``tetrapod`` with cold spines: its body is rigid, its legs alone move.
 
-    Cold, the three spines give by 1.8 rad/(N m): the moments of the legs bend them by less than
-    half a degree. The heaters have nothing to do and are left out; of the spines' TCAs there is
-    only what is seen and what they weigh.
+    Cold, the three spines give by 1.8 rad/(N m): half of the robot's weight on one foot, at the
+    lever of a leg, bends them by 0.6 degrees. The heaters have nothing to do and are left out; of
+    the spines' TCAs there is only what is seen and what they weigh.
 
     Args:
         spec: The robot.
