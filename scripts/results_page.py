@@ -39,11 +39,14 @@ SHOWN = {
 }  # fmt: skip
 # What is drawn of a learning curve, the first of these that it has: columns and what they are.
 CURVES = (
-    (("top_speed", "validation_speed"), "speed over the script's"),
+    (("speed_mean_m_per_s", "validation_speed_m_per_s"), "speed [m/s]"),
     (("return_mean",), "return"),
 )
 
 
+CURVE_NOTE = """\
+Of gaits: the mean speed of a generation, on one robot that is drawn for it, so that it goes up and
+down; and that of the middle of the search on the eight robots of the validation, always the same."""
 INTRODUCTION = """\
 # Results
 
@@ -152,7 +155,7 @@ def page(results: dict[str, dict[str, dict[str, Any]]]) -> str:
         lines += [f"## `{task}`", "", *table(task, found), ""]
     drawn = curves()
     if drawn:
-        lines += ["## Learning curves", "", *drawn]
+        lines += ["## Learning curves", "", CURVE_NOTE, "", *drawn]
     return "\n".join(lines)
 
 
