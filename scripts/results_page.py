@@ -46,7 +46,8 @@ CURVES = (
 
 CURVE_NOTE = """\
 Of gaits: the mean speed of a generation, on one robot that is drawn for it, so that it goes up and
-down; and that of the middle of the search on the eight robots of the validation, always the same."""
+down; and that of the search's middle on the eight robots of the validation, always the same."""
+
 INTRODUCTION = """\
 # Results
 
