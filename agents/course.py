@@ -136,6 +136,7 @@ class CourseWalker:
     def reset(self) -> None:
         """Back to the start of the course."""
         self._number = 0
+        self._body = np.array(self._thermostat.heat.ambient)  # unseen, but followed
         self._enter()
 
     @property
@@ -166,7 +167,9 @@ class CourseWalker:
                 legs, spines, voltage = self._bend(stage, seen)
         self._time += self._dt
         target = np.concatenate([np.maximum(legs, 25.0).ravel(), np.full(3, spines)])
-        power = self._thermostat.power(seen["TCA temperature"], target)
+        now = seen["TCA temperature"]
+        power = self._thermostat.power(now, target, self._body)
+        self._body = self._thermostat.heat.body_after(self._body, now, self._dt)
         action = np.concatenate([power / self._max_power, voltage / self._voltage])
         return (2.0 * action - 1.0).astype(np.float32)
 

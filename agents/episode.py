@@ -210,6 +210,7 @@ class Episode:
                     samples["bend"],
                     [name.partition(".")[2] for name in self.sim.tca_names],
                     self.phases,
+                    body=samples["body"] if self.sim.embedded.any() else None,
                     title=f"{self._title}, seed {self.seed}: {self.ending}",
                 )
 
@@ -256,6 +257,7 @@ class Episode:
         self.clock.append(sim.time)
         for name in ("power", "temperature", "tension"):
             self.samples[name].append(np.array(getattr(sim, name)))
+        self.samples["body"].append(np.where(sim.embedded, sim.body_temperature, np.nan))
         self.samples["bend"].append(self._bend())
 
 

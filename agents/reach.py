@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tca_mj.control import Thermostat
-from tca_mj.envs.hanging import StaticTip
+from tca_mj.envs.hanging import TCAS, StaticTip
 from tca_mj.envs.reach import ACTION, OBSERVATION, BendReach
 from tca_mj.modules.bending import BendingSpec
 
@@ -38,6 +38,8 @@ class ReachPolicy:
     _rest: NDArray[np.float64] = field(default_factory=lambda: np.zeros(3))
     _slope: NDArray[np.float64] = field(default_factory=lambda: np.eye(3))
     _off: NDArray[np.float64] = field(default_factory=lambda: np.zeros(3))
+    _body: NDArray[np.float64] = field(default_factory=lambda: np.zeros(TCAS))
+    _dt = BendReach.control_period
 
     def __post_init__(self) -> None:
         self._static = StaticTip(self.module_spec)
@@ -58,6 +60,8 @@ class ReachPolicy:
         """The action for the next control period, shape (3,)."""
         rows = OBSERVATION.read(observation.astype(np.float64))
         target, temperature = rows["target position"], rows["TCA temperature"]
+        if self._target is None:  # an episode begins
+            self._body = np.full(TCAS, self._static.sim.bank.heat.ambient)
         if self._target is None or (target != self._target).any():
             self._target = target
             self._rest, self._slope, _ = self._static.inverse(target, BendReach.hottest_target)
@@ -66,7 +70,8 @@ class ReachPolicy:
         aim = np.clip(aim, ambient, self.hottest)
         if np.abs(temperature - aim).max() < self.near:
             missed = rows["tip position"] - target
-            self._off += BendReach.control_period / self.averaging * missed
-        power = self._thermostat.power(temperature, aim)
+            self._off += self._dt / self.averaging * missed
+        power = self._thermostat.power(temperature, aim, self._body)
+        self._body = self._thermostat.heat.body_after(self._body, temperature, self._dt)
         action = 2.0 * power / BendReach.max_power - 1.0
         return np.clip(action, -1.0, 1.0).astype(ACTION.space.dtype)

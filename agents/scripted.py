@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from tca_mj.envs.arm import ACTION, OBSERVATION, ArmPickPlace
 from tca_mj.robots.arm import ArmSpec, arm
 from tca_mj.tca import TcaSpec
+from tca_mj.tca.spec import heat_of
 
 PHASES = ("align", "open", "lower", "pinch", "lift", "turn back", "bend", "release", "done")
 
@@ -111,6 +112,7 @@ class PickAndPlace:
         self._bend = np.zeros(2)
         self._calm = self._opening = self._height = 0.0
         self._mean = None
+        self._heat.reset()
 
     def act(self, observation: NDArray[np.float32]) -> NDArray[np.float32]:
         """The action for the next control period, shape (6,)."""
@@ -239,15 +241,21 @@ class _Heaters:
     """Power that brings TCAs of known heat capacity and loss to wanted temperatures."""
 
     def __init__(self, specs: Sequence[TcaSpec]) -> None:
-        self.capacity = np.array([spec.heat.capacity for spec in specs])
-        self.loss = np.array([spec.heat.loss for spec in specs])
+        self.heat = heat_of(specs)
+        self.reset()
+
+    def reset(self) -> None:
+        """All is cold."""
+        self.body = np.array(self.heat.ambient)  # what the TCAs lie in is not seen, but followed
 
     def power(
         self, temperature: NDArray[np.float64], wanted: NDArray[np.float64], settling: float
     ) -> NDArray[np.float64]:
         """Not negative, shape (n,) [W]; a wanted temperature of -inf is off."""
-        hold = self.loss * (np.minimum(temperature, wanted) - _Seen.ambient)
-        return np.maximum(hold + self.capacity * (wanted - temperature) / settling, 0.0)
+        heat = self.heat
+        hold = heat.keeping(np.maximum(np.minimum(temperature, wanted), self.body), self.body)
+        self.body = heat.body_after(self.body, temperature, _DT)
+        return np.maximum(hold + heat.capacity * (wanted - temperature) / settling, 0.0)
 
 
 class _Seen:

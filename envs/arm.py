@@ -11,7 +11,7 @@ from dm_control.utils import rewards
 from numpy.typing import ArrayLike, NDArray
 
 from tca_mj.assets import mjcf
-from tca_mj.envs.base import Observation, Outcome, SimulatedTask
+from tca_mj.envs.base import Observation, Outcome, SimulatedTask, broken_off, heat_of_tcas
 from tca_mj.envs.table import Entry, Table, numbers
 from tca_mj.envs.vector import TaskVector
 from tca_mj.model.scene import scene
@@ -233,7 +233,7 @@ class ArmPickPlace(SimulatedTask):
 
     def finish(self, drive: Drive, error: SimulationDiverged | None) -> Outcome:
         """What the control step has led to; see ``SimulatedTask``."""
-        reason = None if error is None else f"diverged: {error}"
+        reason = broken_off(error)
         self._carried = self._carried or bool(self._position()[2] > _STAND + _LIFTED)
         observation = self._observe()
         outside = OBSERVATION.outside(observation)
@@ -336,7 +336,7 @@ class ArmPickPlace(SimulatedTask):
             "touched": self._touched(),
             "time": sim.time,
             "energy": sim.energy.copy(),
-            "temperature": sim.temperature.copy(),
+            **heat_of_tcas(sim),
             "tension": sim.tension.copy(),
         }
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from tca_mj.envs.table import numbers
 from tca_mj.render import Offscreen, colour_tendons
-from tca_mj.sim import Drive, Simulation, SimulationDiverged
+from tca_mj.sim import Drive, Simulation, SimulationDiverged, SimulationOverheated
 
 Observation = NDArray[np.float32]
 Action = NDArray[np.float32]
@@ -149,6 +149,28 @@ class SimulatedTask(gym.Env[Observation, Action], ABC):
         if self._screen is not None:
             self._screen.close()
             self._screen = None
+
+
+def heat_of_tcas(sim: Simulation) -> dict[str, Any]:
+    """What every task's ``info`` says of heat, arrays of shape (n,).
+
+    Returns:
+        ``temperature`` of the TCAs; ``body_temperature`` of what they lie in, the air's if they are
+        bare [°C]; and ``extrapolated``, whether a TCA is hotter than what its law was measured at.
+    """
+    return {
+        "temperature": sim.temperature.copy(),
+        "body_temperature": sim.body_temperature.copy(),
+        "extrapolated": sim.extrapolated,
+    }
+
+
+def broken_off(error: SimulationDiverged | None) -> str | None:
+    """Why a simulation broke off, as a reason to truncate an episode; None if it did not."""
+    if error is None:
+        return None
+    kind = "overheated" if isinstance(error, SimulationOverheated) else "diverged"
+    return f"{kind}: {error}"
 
 
 def how_it_ended(terminated: bool, truncated: bool, info: dict[str, Any]) -> str | None:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tca_mj.assets import mjcf
-from tca_mj.envs.base import Observation, Outcome, SimulatedTask
+from tca_mj.envs.base import Observation, Outcome, SimulatedTask, broken_off, heat_of_tcas
 from tca_mj.envs.stance import CAMERAS as FOLLOWING
 from tca_mj.envs.stance import tetrapod_scene
 from tca_mj.envs.table import Entry, Table, numbers
@@ -263,7 +263,7 @@ class TetrapodCourse(SimulatedTask):
 
     def finish(self, drive: Drive, error: SimulationDiverged | None) -> Outcome:
         """What the control step has led to; see ``SimulatedTask``."""
-        reason = None if error is None else f"diverged: {error}"
+        reason = broken_off(error)
         observation = self._observe()
         outside = OBSERVATION.outside(observation)
         if outside:
@@ -357,6 +357,7 @@ class TetrapodCourse(SimulatedTask):
             "energy": self.energy,
             "tca_energy": dict(zip(sim.tca_names, sim.energy.tolist(), strict=True)),
             "heater_energy": dict(zip(sim.spines.names, sim.spines.energy.tolist(), strict=True)),
+            **heat_of_tcas(sim),
             "touched_plate": self.touched,
             "damaged": sim.spines.damaged.copy(),
             "body_angle": self.body_angle,

@@ -1,7 +1,5 @@
 """A bending module that hangs from a stand, and where its tip rests."""
 
-from dataclasses import replace
-
 import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -80,11 +78,10 @@ class StaticTip:
             NoRest: If the tip still moves then.
             SimulationDiverged: If the module leaves what the TCAs' law holds for.
         """
-        sim, heat = self.sim, self.sim.bank.heat
+        sim = self.sim
         temperature = np.array(temperature, dtype=np.float64)
         sim.reset()
-        sim.tca = replace(sim.tca, temperature=temperature)
-        power = heat.loss * (temperature - heat.ambient)
+        power = sim.keep(temperature)
         sim.step(power, _RESTING - PERIOD)
         before = self.tip()
         sim.step(power, PERIOD)

@@ -11,7 +11,7 @@ from dm_control.utils import rewards
 from numpy.typing import NDArray
 
 from tca_mj.assets import mjcf
-from tca_mj.envs.base import Observation, Outcome, SimulatedTask
+from tca_mj.envs.base import Observation, Outcome, SimulatedTask, broken_off, heat_of_tcas
 from tca_mj.envs.table import Entry, Table, numbers
 from tca_mj.envs.vector import TaskVector
 from tca_mj.model.part import Part, new_spec
@@ -210,7 +210,7 @@ class MorphModule(SimulatedTask):
 
     def finish(self, drive: Drive, error: SimulationDiverged | None) -> Outcome:
         """What the control step has led to; see ``SimulatedTask``."""
-        reason = None if error is None else f"diverged: {error}"
+        reason = broken_off(error)
         off = not (drive.power.any() or drive.voltage or drive.fan)
         before = self._progress
         if reason is None:  # nothing is known of a diverged state
@@ -298,7 +298,7 @@ class MorphModule(SimulatedTask):
             "time": sim.time,
             "energy": sim.energy.copy(),
             "heater_energy": sim.spines.energy.copy(),
-            "temperature": sim.temperature.copy(),
+            **heat_of_tcas(sim),
             "spine_temperature": sim.spines.temperature.copy(),
             "tension": sim.tension.copy(),
             "damaged": bool(sim.spines.damaged.any()),

@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from tca_mj.envs.base import Observation, Outcome, SimulatedTask
+from tca_mj.envs.base import Observation, Outcome, SimulatedTask, broken_off, heat_of_tcas
 from tca_mj.envs.hanging import CLAMP, PERIOD, TCAS, NoRest, StaticTip
 from tca_mj.envs.table import Entry, Table, numbers
 from tca_mj.envs.vector import TaskVector
@@ -195,7 +195,7 @@ class BendReach(SimulatedTask):
     def _hottest(self) -> float:
         """Highest temperature at a target: ``hottest_target``, or what the power can keep."""
         heat = self.sim.bank.heat
-        kept = heat.ambient + _SUPPLY * self.max_power / heat.loss
+        kept = heat.ambient + _SUPPLY * self.max_power / (heat.loss + heat.conductance)
         return min(self.hottest_target, float(np.min(kept)))
 
     def begin(self, command: NDArray[np.float64]) -> Drive:
@@ -204,7 +204,7 @@ class BendReach(SimulatedTask):
 
     def finish(self, drive: Drive, error: SimulationDiverged | None) -> Outcome:
         """What the control step has led to; see ``SimulatedTask``."""
-        reason = None if error is None else f"diverged: {error}"
+        reason = broken_off(error)
         self.static.locate()
         observation = self._observe()
         outside = OBSERVATION.outside(observation)
@@ -278,7 +278,7 @@ class BendReach(SimulatedTask):
             "distance_to_target": self._distance,
             "time": sim.time,
             "energy": sim.energy.copy(),
-            "temperature": sim.temperature.copy(),
+            **heat_of_tcas(sim),
             "tension": sim.tension.copy(),
             "variation": asdict(self.variation),
         }

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tca_mj.assets import mjcf
-from tca_mj.envs.base import Observation, Outcome, SimulatedTask
+from tca_mj.envs.base import Observation, Outcome, SimulatedTask, broken_off, heat_of_tcas
 from tca_mj.envs.stance import CAMERAS, LEG_TCAS, Stance, tetrapod_scene
 from tca_mj.envs.table import Entry, Table, numbers
 from tca_mj.envs.vector import TaskVector
@@ -235,7 +235,7 @@ class TetrapodGait(SimulatedTask):
 
     def finish(self, drive: Drive, error: SimulationDiverged | None) -> Outcome:
         """What the control step has led to; see ``SimulatedTask``."""
-        reason = None if error is None else f"diverged: {error}"
+        reason = broken_off(error)
         observation = self._observe()
         outside = OBSERVATION.outside(observation)
         if outside:
@@ -331,7 +331,7 @@ class TetrapodGait(SimulatedTask):
             "time": sim.time,
             "energy": sim.energy.copy(),
             "heater_energy": sim.spines.energy.copy(),
-            "temperature": sim.temperature.copy(),
+            **heat_of_tcas(sim),
             "tension": sim.tension.copy(),
             "variation": self._varied.copy(),
         }

@@ -19,7 +19,6 @@ from tca_mj.modules.bending import BendingSpec, bending_module
 from tca_mj.modules.finger import FingerPairSpec, finger_pair
 from tca_mj.modules.twisting import TwistingSpec, twisting_module
 from tca_mj.sim import Simulation
-from tca_mj.tca import TcaState
 
 Build = Callable[[int], Part]
 MODULES: dict[str, tuple[Build, str, float, list[list[float]]]] = {
@@ -45,8 +44,7 @@ def at_rest(part: Part, temperature: Sequence[float], timestep: float) -> Simula
     target = np.asarray(temperature, dtype=np.float64)
     for share in np.minimum(np.arange(1, 90) / 10, 1.0):  # warmed up in a second
         now = 25.0 + share * (target - 25.0)
-        sim.tca = TcaState(now, sim.tca.energy_in, sim.tca.energy_lost)
-        sim.step(sim.bank.heat.loss * (now - 25.0), 0.1)
+        sim.step(sim.keep(now), 0.1)
         if share == 1.0 and np.abs(sim.data.qvel).max() < 1e-6:
             break
     return sim

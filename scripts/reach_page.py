@@ -8,7 +8,6 @@ import argparse
 import itertools
 import math
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -76,7 +75,7 @@ def baselines() -> str:
 def history(cases: int = 60) -> str:
     """Whether the place of rest depends on what was before, as Markdown."""
     lines = ["| hottest | gain 0.8 | gain 1 | gain 1.2 | gain 1.5 |", "|---|---|---|---|---|"]
-    static, heat = StaticTip(BendingSpec()), StaticTip(BendingSpec()).sim.bank.heat
+    static = StaticTip(BendingSpec())
     corners = np.array(list(itertools.product((0.0, 1.0), repeat=3)))
     for hottest in (130.0, 140.0, 150.0):
         row = []
@@ -93,8 +92,7 @@ def history(cases: int = 60) -> str:
                 except NoRest:
                     restless += 1
                     continue
-                static.sim.tca = replace(static.sim.tca, temperature=ends)
-                static.sim.step(heat.loss * (ends - 25.0), 6.0)
+                static.sim.step(static.sim.keep(ends), 6.0)
                 worst = max(worst, float(np.linalg.norm(static.tip() - rest)))
             row.append(f"{1e6 * worst:.0f} µm" + (f", {restless} without rest" if restless else ""))
         lines.append(f"| {hottest:.0f} °C | {' | '.join(row)} |")

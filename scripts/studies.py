@@ -9,7 +9,6 @@ import argparse
 import math
 import re
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -125,8 +124,7 @@ def held(part: Part, temperature: Sequence[float]) -> Simulation:
     before = sim.data.xpos.copy()
     for share in np.minimum(np.arange(1, 200) / 10, 1.0):  # warmed up in a second
         now = sim.bank.heat.ambient + share * (target - sim.bank.heat.ambient)
-        sim.tca = replace(sim.tca, temperature=now)
-        sim.step(sim.bank.heat.loss * (now - sim.bank.heat.ambient), 0.1)
+        sim.step(sim.keep(now), 0.1)
         if share == 1.0 and np.abs(sim.data.xpos - before).max() < 1e-8:
             return sim
         before = sim.data.xpos.copy()

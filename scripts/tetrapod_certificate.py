@@ -29,7 +29,7 @@ from tca_mj.rod import solve_static
 from tca_mj.rod.beam import torsion_constant
 from tca_mj.routes import Helix, UTurn, leg_length
 from tca_mj.sim import Simulation
-from tca_mj.tca import TcaState, law_at
+from tca_mj.tca import law_at
 
 Array = NDArray[np.float64]
 SPEC = TetrapodSpec()
@@ -164,8 +164,7 @@ class Bench:
         sim.spines.state = replace(state, heat=heat)
         now = np.full(sim.n, COLD)
         now[-3:] = tcas
-        sim.tca = TcaState(now, sim.tca.energy_in, sim.tca.energy_lost)
-        sim.step(sim.bank.heat.loss * (now - COLD), seconds, voltage=volts)
+        sim.step(sim.keep(now), seconds, voltage=volts)
 
 
 def shape(model: mujoco.MjModel) -> list[tuple[int, float]]:

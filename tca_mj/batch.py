@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from tca_mj.model.smooth import SmoothBody, Strained
 from tca_mj.model.spines import Spines
 from tca_mj.sim import DIVERGENCE, Drive, Simulation, SimulationDiverged, bias
-from tca_mj.tca import CoilSolveError, Pull, TcaBank, TcaState
+from tca_mj.tca import CoilSolveError, Pull, TcaBank, TcaMelted, TcaState
 from tca_mj.tca.arrays import row, stacked
 
 Array = NDArray[np.float64]
@@ -102,7 +102,7 @@ class SimulationBatch:
             return errors
         try:
             strayed = self._run(np.array(moving), inputs, updates)
-        except (CoilSolveError, ValueError, mujoco.batch.SimulationError):
+        except (CoilSolveError, TcaMelted, ValueError, mujoco.batch.SimulationError):
             strayed = moving
         for i in strayed:
             drive = drives[i]

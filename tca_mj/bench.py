@@ -248,7 +248,7 @@ def _heating(sim: Simulation) -> NDArray[np.float64]:
     """Power that keeps the second bending TCA hot and the others cold."""
     power = np.zeros(sim.n)
     heat = sim.bank.specs[1].heat
-    power[1] = heat.loss * (_HOT - heat.ambient)
+    power[1] = heat.keeping(_HOT, heat.ambient)  # while its body is cold
     return power
 
 

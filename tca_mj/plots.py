@@ -115,6 +115,7 @@ def rollout_plot(
     names: Sequence[str],
     events: Sequence[tuple[float, str]] = (),
     *,
+    body: ArrayLike | None = None,
     title: str = "",
     temperature_limit: float | None = HOTTEST,
     tension_limit: float | None = BREAKING_FORCE,
@@ -130,6 +131,8 @@ def rollout_plot(
         bend: Bend angle of the body, shape (frames,) [deg].
         names: Names of the n TCAs.
         events: Time [s] and short text of what happened, in any order.
+        body: Temperature of what the TCAs lie in, shape (frames, n) [°C], drawn dotted beside theirs;
+            None, or NaN for a bare TCA, is not drawn.
         title: Title above the plot.
         temperature_limit: Temperature drawn as a limit [°C], None for no line.
         tension_limit: Tension drawn as a limit [N], None for no line.
@@ -210,6 +213,14 @@ def rollout_plot(
                 for i in range(len(names))
             ]
             lines = lines or drawn
+            if body is not None and label.startswith("temperature"):
+                warm = np.broadcast_to(np.asarray(body, dtype=np.float64), values.shape)
+                for i, colour in enumerate(colours):
+                    axis.plot(clock, warm[:, i], color=colour, linewidth=1.3, linestyle=":")
+                axis.annotate(
+                    "dotted: the body that a TCA lies in", (0.0, 0.0), xycoords="axes fraction",
+                    xytext=(6, 3), textcoords="offset points", color="#5f6368", fontsize=8,
+                )
             axis.set_ylim(bottom=min(0.0, float(np.nanmin(values, initial=0.0))))
         if limit is not None:
             axis.axhline(limit, color="#c5221f", linewidth=1.1, linestyle=(0, (5, 3)))

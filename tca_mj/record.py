@@ -14,6 +14,8 @@ Entities:
   by kind. The geoms of MuJoCo's own world body are ``/world/scene``.
 * ``/world/tca/<name>``: path of a TCA.
 * ``/actuators/<name>/{power,temperature,tension,length,resistance}``: W, °C, N, m, ohm.
+* ``/actuators/<name>/body_temperature`` of what a TCA lies in, if it is not bare: °C. When a TCA gets
+  hotter than what its law was measured at, or colder again, an event says so.
 * ``/heaters/<name>/{voltage,temperature}`` of the shape-memory spines, if there are any: V, °C.
 * ``/reward/<term>`` and ``/events``.
 """
@@ -40,6 +42,7 @@ QUANTITIES = {
     "resistance": "Resistance [Ω]",
 }
 
+BODY_QUANTITY, BODY_TITLE = "body_temperature", "Soft bodies [°C]"
 HEATER_QUANTITIES = {"voltage": "Spine heaters [V]", "temperature": "Spines [°C]"}
 
 _LIGHTNESS = 0.75  # of the curves, on Rerun's dark ground
@@ -58,7 +61,8 @@ class Recorded(Protocol):
     """What is recorded of a simulation; ``tca_mj.sim.Simulation`` has it.
 
     The properties are float64 of shape (n,), one entry per TCA. Shape-memory spines are recorded
-    too where there are some: an attribute ``spines`` as ``Simulation`` has it.
+    too where there are some, and soft bodies: attributes ``spines``, ``embedded``,
+    ``body_temperature`` and ``extrapolated`` as ``Simulation`` has them.
     """
 
     @property
@@ -147,6 +151,10 @@ class Recorder:
         self._position = np.zeros((self._bodies.size, chunk, 3), dtype=np.float32)
         self._quaternion = np.zeros((self._bodies.size, chunk, 4), dtype=np.float32)
         self._curves = np.zeros((len(QUANTITIES), n, chunk))
+        # TCAs that lie in a body; and those that were beyond what is measured, at the last frame.
+        self._embedded = np.flatnonzero(getattr(simulation, "embedded", np.zeros(n, dtype=bool)))
+        self._warmth = np.zeros((self._embedded.size, chunk))
+        self._beyond = np.zeros(n, dtype=bool)
         spines = getattr(simulation, "spines", None)
         self._spines = spines if spines is not None and spines.n else None
         self._heaters: tuple[str, ...] = () if self._spines is None else self._spines.names
@@ -162,7 +170,10 @@ class Recorder:
         self._stream.save(self.path, write_footer=footer)
         centre, size = extent(model, simulation.data)
         ground = ground_height(model)
-        blueprint = _blueprint(simulation.tca_names, self._heaters, centre, size, ground)
+        embedded = tuple(simulation.tca_names[j] for j in self._embedded)
+        blueprint = _blueprint(
+            simulation.tca_names, embedded, self._heaters, centre, size, ground
+        )
         self._stream.send_blueprint(blueprint)
         for entity, content in self._static(paths, moving, tca_radius, size):
             self._stream.log(entity, content, static=True, strict=True)
@@ -192,6 +203,10 @@ class Recorder:
         self._quaternion[:, i] = data.xquat[self._bodies]
         for row, quantity in enumerate(QUANTITIES):
             self._curves[row, :, i] = getattr(simulation, quantity)
+        if self._embedded.size:
+            bodies: Any = simulation
+            self._warmth[:, i] = bodies.body_temperature[self._embedded]
+        self._tell_beyond()
         if self._spines is not None:
             for row, quantity in enumerate(HEATER_QUANTITIES):
                 self._heat[row, :, i] = getattr(self._spines, quantity)
@@ -207,6 +222,15 @@ class Recorder:
         self._filled += 1
         if self._filled == self._chunk:
             self._write()
+
+    def _tell_beyond(self) -> None:
+        """Logs which TCAs have left what their law was measured at, or have come back."""
+        beyond = getattr(self.simulation, "extrapolated", self._beyond)
+        for j in np.flatnonzero(beyond != self._beyond):
+            where = "beyond" if beyond[j] else "within"
+            text = f"{self.simulation.tca_names[j]}: {where} the measured temperatures"
+            self._events.append((self._last + self._offset, self._calls - 1, text))
+        self._beyond = np.array(beyond)
 
     def event(self, text: str) -> None:
         """Logs ``text`` at the simulation's present time, at the step of the next frame.
@@ -278,6 +302,10 @@ class Recorder:
                 lines = rerun.components.LineStrip3DBatch(np.array(strips) if even else strips)
                 shades = rerun.components.ColorBatch(colours[j])
                 self._send(_line(name), times, (_STRIP, lines, ones), (_COLOUR, shades, ones))
+            for row, j in enumerate(self._embedded):
+                values = rerun.components.ScalarBatch(self._warmth[row, :k])
+                path = _curve(self.simulation.tca_names[j], BODY_QUANTITY)
+                self._send(path, times, (_SCALAR, values, ones))
             for j, name in enumerate(self._heaters):
                 for row, quantity in enumerate(HEATER_QUANTITIES):
                     values = rerun.components.ScalarBatch(self._heat[row, j, :k])
@@ -326,6 +354,10 @@ class Recorder:
                 yield f"{path}/{kind}", solid
         names, tendons = simulation.tca_names, simulation.tendon
         colours = series_colours(len(names), lightness=_LIGHTNESS)
+        for j in self._embedded:
+            shade = rgba_bytes(colours[j])
+            style = rerun.SeriesLines(colors=shade, names=names[j], widths=1.5)
+            yield _curve(names[j], BODY_QUANTITY), style
         for name, colour, tendon in zip(names, colours, tendons, strict=True):
             width = max(float(model.tendon_width[tendon]), size / 400.0)
             yield _line(name), rerun.LineStrips3D.from_fields(radii=radius or width)
@@ -372,6 +404,7 @@ def _line(name: str) -> str:
 
 def _blueprint(
     names: tuple[str, ...],
+    embedded: tuple[str, ...],
     heaters: tuple[str, ...],
     centre: NDArray[np.float64],
     size: float,
@@ -408,6 +441,13 @@ def _blueprint(
         )
         for quantity, title in QUANTITIES.items()
     ]
+    if embedded:
+        contents = [_curve(name, BODY_QUANTITY) for name in embedded]
+        bodies = layout.TimeSeriesView(
+            origin="/", contents=contents, name=BODY_TITLE,
+            plot_legend=layout.PlotLegend(visible=False),
+        )  # fmt: skip
+        curves.insert(list(QUANTITIES).index("temperature") + 1, bodies)
     if heaters:
         curves += [
             layout.TimeSeriesView(

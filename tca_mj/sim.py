@@ -25,7 +25,15 @@ from numpy.typing import ArrayLike, NDArray
 from tca_mj.model.part import Part
 from tca_mj.model.smooth import SmoothBody
 from tca_mj.model.spines import Spines
-from tca_mj.tca import CalibrationError, CoilSolveError, Pull, TcaBank, TcaSpec, TcaState
+from tca_mj.tca import (
+    CalibrationError,
+    CoilSolveError,
+    Pull,
+    TcaBank,
+    TcaMelted,
+    TcaSpec,
+    TcaState,
+)
 from tca_mj.tca.arrays import floats
 
 _TAUT = 1e-10  # tension added to each TCA's law, so that at rest it is taut [N]
@@ -43,6 +51,10 @@ DIVERGENCE = {
 
 class SimulationDiverged(ArithmeticError):
     """The simulation left the range of finite, physical states."""
+
+
+class SimulationOverheated(SimulationDiverged):
+    """A TCA would be hotter than the temperature at which its fibre melts."""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True, eq=False)
@@ -166,6 +178,23 @@ class Simulation:
         self._hand_over(self.bank.pull(self.tca, self.strained.length + self.length_offset))
         mujoco.mj_forward(model, data)
 
+    def keep(self, temperature: ArrayLike) -> NDArray[np.float64]:
+        """Puts the TCAs at temperatures at which they have been for long, and what they lie in.
+
+        Energies count from here. The tensions are those of before until the next step.
+
+        Args:
+            temperature: Temperatures, shape (n,), not below the surroundings' [°C].
+
+        Returns:
+            The power that keeps them there, shape (n,) [W].
+
+        Raises:
+            ValueError: As ``TcaBank.steady``.
+        """
+        self.tca, power = self.bank.steady(temperature)
+        return power
+
     def _locate(self) -> None:
         """Computes positions and tendon lengths, and no more, from the joints."""
         mujoco.mj_kinematics(self.model, self.data)
@@ -186,6 +215,21 @@ class Simulation:
     def temperature(self) -> NDArray[np.float64]:
         """Temperature of each TCA, shape (n,) [°C]."""
         return self.tca.temperature
+
+    @property
+    def body_temperature(self) -> NDArray[np.float64]:
+        """Temperature of what each TCA lies in, shape (n,); of the air if it is bare [°C]."""
+        return self.tca.body
+
+    @property
+    def embedded(self) -> NDArray[np.bool_]:
+        """Which TCAs lie in a soft body, shape (n,)."""
+        return self.bank.embedded
+
+    @property
+    def extrapolated(self) -> NDArray[np.bool_]:
+        """Which TCAs are hotter than what was measured, shape (n,): their law is a guess there."""
+        return self.bank.overheated(self.tca)
 
     @property
     def length(self) -> NDArray[np.float64]:
@@ -239,6 +283,7 @@ class Simulation:
             ValueError: If the power has the wrong shape, is negative or not finite, the voltage
                 or the fan has the wrong shape or is not finite, or the duration is no multiple of
                 ``tca_period``.
+            SimulationOverheated: If a TCA would be hotter than its fibre melts at.
             SimulationDiverged: If the state is no longer finite, or a TCA is shorter, longer or
                 hotter than its law holds for.
         """
@@ -253,6 +298,10 @@ class Simulation:
             heat = self.tca
             try:
                 self.tca, pull = self.bank.advance(self.tca, power, length, self.tca_period)
+            except TcaMelted as melted:
+                raise SimulationOverheated(
+                    f"{self.tca_names[melted.number]} {melted.why}, at {self.time:.3f} s"
+                ) from melted
             except (CoilSolveError, ValueError) as error:  # far too hot for the law
                 raise SimulationDiverged(
                     f"the TCAs have no state at {self.time:.3f} s: {error}"

@@ -9,7 +9,7 @@ simulation as it was built, bit for bit.
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -37,7 +37,8 @@ class Variation:
         friction: Of all coefficients of friction [1].
         mass: Of all masses and inertias [1].
         tca_gain: Of the tension of every TCA, and so of its slope [1].
-        heat_loss: Of the heat that TCAs and spines lose per excess temperature [1].
+        heat_loss: Of the heat that TCAs, the bodies that they lie in and spines lose per excess
+            temperature [1].
         ambient: Temperature of the surroundings, at which everything starts [°C].
 
     Raises:
@@ -125,12 +126,15 @@ class Nominal:
                 getattr(model, name)[:] = factor * self._figures[name]
         sim.gain = self._gain * variation.tca_gain
         loss, ambient = variation.heat_loss, variation.ambient
-        sim.bank.heat = _varied(self._heat, loss, ambient)
+        sim.bank.heat = _varied(
+            self._heat, loss, ambient,
+            conductance=loss * self._heat.conductance, body_loss=loss * self._heat.body_loss,
+        )  # fmt: skip
         if self._heater is not None:
             sim.spines.bank.heater = _varied(self._heater, loss, ambient)
         self.variation = variation
 
 
-def _varied(heat: Heat, factor: float, ambient: float) -> Heat:
+def _varied(heat: Heat, factor: float, ambient: float, **more: Any) -> Heat:
     loss = factor * np.asarray(heat.loss)
-    return replace(heat, loss=loss, ambient=np.full_like(loss, ambient))
+    return replace(heat, loss=loss, ambient=np.full_like(loss, ambient), **more)

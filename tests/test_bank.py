@@ -1,7 +1,7 @@
 """n TCAs advanced together: batches, energy, resistance and refusals."""
 
 import math
-from dataclasses import replace
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
@@ -16,7 +16,10 @@ SPECS = [*CATALOGUE.values(), HOT_SECTION]
 def random_inputs(bank, shape, seed=0):
     rng = np.random.default_rng(seed)
     size = (*shape, bank.n)
-    state = TcaState(rng.uniform(20.0, 160.0, size), rng.random(size), rng.random(size))
+    state = TcaState(
+        rng.uniform(20.0, 160.0, size), rng.uniform(20.0, 90.0, size), rng.random(size),
+        rng.random(size),
+    )  # fmt: skip
     length = bank.shortest + rng.random(size) * (bank.longest - bank.shortest)
     return state, rng.uniform(0.0, 3.0, size), length
 
@@ -36,14 +39,13 @@ def test_a_batch_is_its_rows_bit_for_bit(contiguous):
     bank = TcaBank(SPECS)
     state, power, length = random_inputs(bank, (40,))
     if not contiguous:
-        state = TcaState(*(np.asfortranarray(a) for a in (state.temperature, state.energy_in,
-                                                          state.energy_lost)))  # fmt: skip
+        state = TcaState(*(np.asfortranarray(getattr(state, f.name)) for f in fields(state)))
         power, length = np.asfortranarray(power), np.asfortranarray(length)
     after, pull = bank.advance(state, power, length, 0.02)
     for i in range(40):
-        row = TcaState(state.temperature[i], state.energy_in[i], state.energy_lost[i])
+        row = TcaState(*(getattr(state, f.name)[i] for f in fields(state)))
         row_after, row_pull = bank.advance(row, power[i], length[i], 0.02)
-        for name in ("temperature", "energy_in", "energy_lost"):
+        for name in ("temperature", "body", "energy_in", "energy_lost"):
             np.testing.assert_array_equal(getattr(row_after, name), getattr(after, name)[i])
         for name in ("tension", "stiffness", "length"):
             np.testing.assert_array_equal(getattr(row_pull, name), getattr(pull, name)[i])
@@ -91,7 +93,7 @@ def test_energy_balance_over_many_steps():
 def test_the_affine_law_is_the_tangent():
     """F(l + d) - law = F'' d^2/2: a tenth of the step, a hundredth of the error."""
     bank = TcaBank([FREE_STROKE])
-    state = TcaState(np.array([120.0]), np.zeros(1), np.zeros(1))
+    state = TcaBank([FREE_STROKE]).steady([120.0])[0]
     pull = bank.pull(state, np.array([0.045]))
     errors = []
     for step in (1e-3, 1e-4):
@@ -124,7 +126,7 @@ def test_rupture_is_reported_and_not_clipped():
 def test_overheating_is_reported():
     bank = TcaBank([FREE_STROKE, FREE_STROKE])
     np.testing.assert_array_equal(bank.max_temperature, [160.0, 160.0])
-    state = TcaState(np.array([159.0, 161.0]), np.zeros(2), np.zeros(2))
+    state = bank.steady([159.0, 161.0])[0]
     np.testing.assert_array_equal(bank.overheated(state), [False, True])
 
 
@@ -149,8 +151,8 @@ def test_length_is_read_back_from_the_resistance():
     np.testing.assert_allclose(sensed_length(WireTable.of(SPECS), ohms), length, rtol=1e-12)
     with pytest.raises(ValueError, match="resistance"):
         sensed_length(WireTable.of(SPECS), -ohms)
-    blind = WireTable.of([replace(FREE_STROKE, resistance_strain=0.0)])
-    with pytest.raises(ValueError, match="strain_coefficient"):
+    blind = WireTable.of([replace(FREE_STROKE, stretch_resistance=0.0)])
+    with pytest.raises(ValueError, match="stretch"):
         sensed_length(blind, [3.0])
 
 
@@ -175,10 +177,10 @@ def test_bad_inputs_are_refused():
     with pytest.raises(ValueError, match="length"):
         bank.resistance(rest, [0.045, 1.0])
     for shape in ((3,), ()):
-        wrong = TcaState(np.full(shape, 25.0), np.zeros(shape), np.zeros(shape))
+        wrong = TcaState(*(np.full(shape, 25.0) for _ in range(4)))
         with pytest.raises(ValueError, match="state"):
             bank.pull(wrong, np.full(shape, 0.045))
-    hot = TcaState(np.full(2, math.nan), np.zeros(2), np.zeros(2))
+    hot = replace(rest, temperature=np.full(2, math.nan))
     with pytest.raises(ValueError, match="temperature"):
         bank.pull(hot, length)
     with pytest.raises(ValueError, match="specs"):

@@ -193,7 +193,7 @@ def test_steep_coils_that_are_stiff_in_bending_buckle(stiff, pitch):
     """
     fibre = replace(FREE_STROKE.fibre, young=stiff * 0.22e9)
     spec = replace(FREE_STROKE, fibre=fibre, pitch_angle=pitch, minimum_pitch_angle=0.02,
-                   coil_radius=10.0 * fibre.radius, resistance_strain=0.0)  # fmt: skip
+                   coil_radius=10.0 * fibre.radius, stretch_resistance=0.0)  # fmt: skip
     rods = CoilRods([spec])
     length = np.linspace(spec.minimum_length, rods.longest, 500)
     cold = np.full_like(length, 25.0)

@@ -12,7 +12,6 @@ from tca_mj.modules.finger import FingerPairSpec, finger_pair
 from tca_mj.modules.twisting import TwistingSpec, twisting_module
 from tca_mj.robots.arm import ArmSpec, arm
 from tca_mj.sim import Simulation
-from tca_mj.tca import TcaState
 
 G = 9.81
 
@@ -28,9 +27,8 @@ def hold(sim, temperature, seconds=3.0):
     goal = np.broadcast_to(np.asarray(temperature, dtype=float), (sim.n,))
     for share in np.linspace(0.1, 1.0, 10):
         now = 25.0 + share * (goal - 25.0)
-        sim.tca = TcaState(now, sim.tca.energy_in, sim.tca.energy_lost)
-        sim.step(sim.bank.heat.loss * (now - 25.0), 0.1)
-    sim.step(sim.bank.heat.loss * (goal - 25.0), seconds)
+        sim.step(sim.keep(now), 0.1)
+    sim.step(sim.keep(goal), seconds)
     assert sim.temperature == pytest.approx(goal)
     assert seconds < 3.0 or np.abs(sim.data.qvel).max() < 1e-2
     return sim
@@ -207,10 +205,10 @@ def test_without_power_everything_returns_to_rest(module):
     moved = np.linalg.norm(tip(sim, site) - start)
     for share in np.linspace(0.9, 0.0, 10):  # quicker than the air would
         now = 25.0 + share * (np.array(hot) - 25.0)
-        sim.tca = TcaState(now, sim.tca.energy_in, sim.tca.energy_lost)
+        sim.keep(now)
         sim.step(np.zeros(sim.n), 0.1)
+    sim.keep(np.full(sim.n, 25.0))
     sim.step(np.zeros(sim.n), 4.0)
-    assert sim.temperature == pytest.approx(np.full(sim.n, 25.0), abs=1e-9)
     assert moved > 0.01 * length
     assert np.linalg.norm(tip(sim, site) - start) < 1e-3 * length
 
@@ -294,7 +292,8 @@ def test_the_arm_hangs_from_its_base_and_moves_with_it():
         (lambda: BendingSpec(count=None), "count must be a whole number, got None"),
         (lambda: BendingSpec(diameter="thick"), "diameter must be .* above 0, got 'thick'"),
         (lambda: TwistingSpec(radius=0.0), r"radius must be .* above 0, got 0\.0"),
-        (lambda: TwistingSpec(sheath_area=math.inf), "sheath_area must be finite .* got inf"),
+        (lambda: TwistingSpec(tube=math.inf), "tube must be finite .* got inf"),
+        (lambda: TwistingSpec(tube=1.2e-3), "tube must be above the TCA's 0.00127"),
         (lambda: FingerPairSpec(closure=0.0), r"closure must be .* above 0, got 0\.0"),
         (lambda: FingerPairSpec(layer=-1e-3), r"layer must be .* above 0, got -0\.001"),
         (lambda: FingerPairSpec(friction=-1.0), r"friction must be .* at least 0, got -1\.0"),
@@ -303,10 +302,6 @@ def test_the_arm_hangs_from_its_base_and_moves_with_it():
         (lambda: twisting_module(TwistingSpec(double=False)), "three sites per turn, got 1.60"),
         (lambda: twisting_module(TwistingSpec(radius=6e-3)), r"route of tca must stay inside"),
         (lambda: twisting_module(TwistingSpec(length=math.nan)), "length must be .* got nan"),
-        (
-            lambda: twisting_module(TwistingSpec(sheath_capacity=-1.0)),
-            "sheath_capacity = -1.0 must be finite and not below 0",
-        ),
         (lambda: finger_pair(FingerPairSpec(offset=9e-3)), "route of tca must stay inside"),
         (lambda: finger_pair(FingerPairSpec(width=0.0)), "above 0, got 0"),
         (lambda: finger_pair(FingerPairSpec(half_width=-1e-3)), "half_width must be at least 0"),

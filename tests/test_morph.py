@@ -25,7 +25,7 @@ from tca_mj.tca import CATALOGUE
 from tca_mj.tca.sensing import fit_displacement
 
 SPINE = SpineSpec()
-TCA = sheathed(CATALOGUE["free-stroke"], SPINE, 0.12)
+TCA = sheathed(CATALOGUE["free-stroke"], SPINE)
 MODULE = LumpedModule(SPINE, HeaterSpec.fitted(SPINE), TCA)
 PI = PiSpec(proportional=60.0, integral=30.0, highest=40.0)
 NORMAL = [Phase.SOFTEN, Phase.MORPH, Phase.HOLD, Phase.HARDEN, Phase.RELEASE, Phase.DONE]

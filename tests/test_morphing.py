@@ -286,7 +286,6 @@ def test_a_tca_that_pulls_at_a_stiff_spine_is_damaged():
         ({"half_width": -1e-3}, "half_width must be finite and above 0, got -0.001"),
         ({"damping_time": math.nan}, "damping_time must be finite and above 0, got nan"),
         ({"tip_mass": -1e-3}, "tip_mass must be finite and at least 0, got -0.001"),
-        ({"tube_capacity": math.inf}, "tube_capacity must be finite and at least 0, got inf"),
         ({"nodes": 2.5}, "nodes must be a whole number, got 2.5"),
         ({"motions": ("twist",)}, "motions must contain 'bend_x', got"),
     ],

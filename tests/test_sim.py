@@ -15,7 +15,7 @@ from tca_mj.modules.bending import BendingSpec, bending_module
 from tca_mj.modules.finger import finger_pair
 from tca_mj.routes import Helix, leg_length
 from tca_mj.sim import Simulation, SimulationDiverged
-from tca_mj.tca import CATALOGUE, FibreSpec, TcaState, step_temperature
+from tca_mj.tca import CATALOGUE, FibreSpec, step_temperature
 from tca_mj.tca.calibration import _calibrated
 
 
@@ -180,8 +180,7 @@ def test_half_the_period_of_the_tcas_changes_a_transient_little():
 def test_the_period_does_not_move_the_shape_at_rest():
     def rest(period):
         sim = simulation(timestep=4e-3, tca_period=period)
-        sim.tca = TcaState(np.array([90.0, 25.0, 25.0]), sim.tca.energy_in, sim.tca.energy_lost)
-        sim.step(sim.bank.heat.loss * (sim.temperature - 25.0), 6.0)
+        sim.step(sim.keep([90.0, 25.0, 25.0]), 6.0)
         return tip(sim)
 
     assert rest(4e-2) == pytest.approx(rest(4e-3), abs=1e-6)
@@ -200,8 +199,7 @@ def test_at_rest_it_has_the_shape_that_settle_finds():
         tcas.append(route_tca(spec, tca, route_passes(chain, route), name=f"tca{i}"))
     spec.option.gravity = [0.0, 0.0, 0.0]
     sim = Simulation(Part(spec, tuple(tcas)), timestep=1e-2)  # its damping grows with the step
-    sim.tca = TcaState(np.array([110.0, 90.0]), sim.tca.energy_in, sim.tca.energy_lost)
-    sim.step(sim.bank.heat.loss * (sim.temperature - 25.0), 15.0)
+    sim.step(sim.keep([110.0, 90.0]), 15.0)
     shape = settle(body, routes, sim.tension, nodes=8)
     assert sim.tension.min() > 0.01
     assert tip(sim) == pytest.approx(shape.tip, abs=2e-6)

@@ -284,7 +284,7 @@ def test_bending_rate_is_that_of_a_soft_spine():
 
 # --- the whole module, lumped
 
-MODULE = LumpedModule(SPINE, HEATER, sheathed(CATALOGUE["free-stroke"], SPINE, 0.12))
+MODULE = LumpedModule(SPINE, HEATER, sheathed(CATALOGUE["free-stroke"], SPINE))
 
 
 def run(state, *, heater=0.0, power=0.0, fan=False, time, dt=0.1, moment=0.0):

@@ -17,7 +17,7 @@ from tca_mj.routes import UTurn
 from tca_mj.sim import Simulation
 from tca_mj.smp import HeaterSpec, SmpSpec, SpineSpec, fixity, recovery
 from tca_mj.smp.bank import SpineBank
-from tca_mj.tca import CATALOGUE, TcaState
+from tca_mj.tca import CATALOGUE
 
 SPINE = SpineSpec(length=40e-3)
 HEATER = HeaterSpec.fitted(SPINE)
@@ -173,9 +173,7 @@ def test_the_spines_tca_bends_it_soft_and_not_rigid():
     rigid, soft = simulation(), simulation()
     volts = heat_to(soft, HOT)
     for sim in (rigid, soft):
-        sim.tca = TcaState(np.array([130.0]), sim.tca.energy_in, sim.tca.energy_lost)
-        power = sim.bank.heat.loss * 105.0
-        sim.step(power, 2.0, voltage=volts if sim is soft else 0.0)
+        sim.step(sim.keep([130.0]), 2.0, voltage=volts if sim is soft else 0.0)
     assert angle(soft) > math.radians(20.0)
     assert 0.0 < angle(rigid) < math.radians(0.5)
 

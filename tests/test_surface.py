@@ -1,7 +1,7 @@
 """Calibration surfaces against the rod; the bank on them."""
 
 import math
-from dataclasses import replace
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
@@ -9,6 +9,7 @@ import pytest
 import tca_mj.tca.calibration as calibration
 from tca_mj.tca import (
     CATALOGUE,
+    BodyHeat,
     CalibrationError,
     CoilRods,
     CoilSurfaces,
@@ -163,7 +164,8 @@ def test_any_reference_temperature_is_a_knot(reference):
 
 def test_coils_that_differ_in_length_or_heat_only_share_a_surface():
     longer = FREE_STROKE.of_length(0.11)
-    other = replace(longer, ambient=30.0, sheath_capacity=1.0, sheath_area=1e-3, contact_ratio=9.0)
+    other = replace(longer, ambient=30.0, body=BodyHeat(conductance=1.0, capacity=1.0, loss=1.0),
+                    contact_ratio=9.0)
     assert calibrate(FREE_STROKE) is calibrate(longer) is calibrate(other)
     coils, rods = CoilSurfaces([longer, other]), CoilRods([longer, other])
     length = np.linspace(coils.shortest, coils.longest, 300)
@@ -226,7 +228,10 @@ def random_inputs(bank, shape, seed=0):
     rng = np.random.default_rng(seed)
     size = (*shape, bank.n)
     # Some start outside the table and are solved by the rod.
-    state = TcaState(rng.uniform(-10.0, 215.0, size), rng.random(size), rng.random(size))
+    state = TcaState(
+        rng.uniform(-10.0, 215.0, size), rng.uniform(20.0, 90.0, size), rng.random(size),
+        rng.random(size),
+    )  # fmt: skip
     length = bank.shortest + rng.random(size) * (bank.longest - bank.shortest)
     return state, rng.uniform(0.0, 3.0, size), length
 
@@ -236,12 +241,11 @@ def test_a_batch_is_its_rows_bit_for_bit(contiguous):
     bank = TcaBank(SPECS, law="surface")
     state, power, length = random_inputs(bank, (40,))
     if not contiguous:
-        state = TcaState(*(np.asfortranarray(a) for a in (state.temperature, state.energy_in,
-                                                          state.energy_lost)))  # fmt: skip
+        state = TcaState(*(np.asfortranarray(getattr(state, f.name)) for f in fields(state)))
         power, length = np.asfortranarray(power), np.asfortranarray(length)
     after, pull = bank.advance(state, power, length, 0.02)
     for i in range(40):
-        row = TcaState(state.temperature[i], state.energy_in[i], state.energy_lost[i])
+        row = TcaState(*(getattr(state, f.name)[i] for f in fields(state)))
         row_after, row_pull = bank.advance(row, power[i], length[i], 0.02)
         np.testing.assert_array_equal(row_after.temperature, after.temperature[i])
         for name in ("tension", "stiffness", "length"):
@@ -255,9 +259,9 @@ def test_a_bank_is_its_tcas_bit_for_bit_whoever_built_the_surfaces(tmp_path):
     calibration._calibrated.cache_clear()  # from now on they come from files
     for i, spec in enumerate(SPECS):
         alone = TcaBank([spec], law="surface").pull(
-            TcaState(*(a[i : i + 1] for a in (state.temperature, state.energy_in,
-                                              state.energy_lost))), length[i : i + 1]
-        )  # fmt: skip
+            TcaState(*(getattr(state, f.name)[i : i + 1] for f in fields(state))),
+            length[i : i + 1],
+        )
         assert (alone.tension[0], alone.stiffness[0]) == (pull.tension[i], pull.stiffness[i])
 
 

@@ -8,6 +8,8 @@ import pytest
 
 from tca_mj.tca import (
     CATALOGUE,
+    MODULE_TCAS,
+    BodyHeat,
     FibreSpec,
     FibreTable,
     TcaSpec,
@@ -59,34 +61,59 @@ def test_coils_of_the_catalogue_do_not_overlap():
         assert spec.minimum_length < spec.rest_length < spec.fibre_length
 
 
+def test_masses_of_what_was_weighed():
+    """117 mg per twisted metre three ways, and 32 mg for each TCA of Chapter 2 (Sun, 2.1.1)."""
+    named = 4 * 23.5e-6 * 218.0 / 175.0  # 235/36 dtex, 4 ply; 218 mm become 175 mm (Table 3.2)
+    conical = 4 * 23.5e-6 * 181.0 / 145.0  # 181 mm become 145 mm, the same thread
+    measured = 1300.0 * math.pi * 0.17e-3**2  # Table 3.1 on the 0.34 mm of Table 2.1
+    for density in (named, conical, measured):
+        assert FREE_STROKE.fibre.line_density == pytest.approx(density, rel=0.01)
+    assert FREE_STROKE.fibre.line_density == pytest.approx(117e-6, rel=0.1)
+    for name, spec in CATALOGUE.items():
+        if name.startswith("type-"):  # one 0.03 g, five 0.16 g
+            assert spec.mass == pytest.approx(0.16e-3 / 5, rel=0.1)
+            assert spec.mass == pytest.approx(0.03e-3, rel=0.1)
+        else:
+            assert spec.mass / spec.fibre_length == pytest.approx(117e-6, rel=0.1)
+    for spec in MODULE_TCAS.values():
+        assert spec.mass / spec.fibre_length == pytest.approx(117e-6, rel=0.1) or (
+            spec.mass == pytest.approx(32e-6, rel=0.1)
+        )
+
+
 def test_mass_and_heat_from_the_fibre():
     spec = FREE_STROKE
-    mass = 1300.0 * math.pi * 0.21e-3**2 * 0.175
-    assert spec.mass == pytest.approx(mass, rel=1e-12)
-    assert spec.heat.capacity == pytest.approx(mass * 1267.0, rel=1e-12)
+    assert spec.heat.capacity == pytest.approx(spec.mass * 1267.0, rel=1e-12)
     assert spec.heat.loss == pytest.approx(23.0 * 2.5 * 2.0 * math.pi * 0.21e-3 * 0.175, rel=1e-12)
-    # rho r c_p / (2 c_s h): the length cancels; 3.0 s with the numbers of Table 3.1.
-    assert spec.heat.time_constant == pytest.approx(
-        1300.0 * 0.21e-3 * 1267.0 / (2.0 * 2.5 * 23.0), rel=1e-12
-    )
+    # 2.0 s with what was weighed, 3.0 s with the density of Table 3.1 on its circle.
+    assert spec.heat.time_constant == pytest.approx(1.95, abs=0.01)
 
 
-def test_a_sheath_adds_capacity_and_replaces_the_surface():
-    sheathed = replace(FREE_STROKE, sheath_capacity=0.7, sheath_area=4e-4)
-    assert sheathed.heat.capacity == pytest.approx(FREE_STROKE.heat.capacity + 0.7)
-    assert sheathed.heat.loss == pytest.approx(23.0 * 4e-4)
+def test_in_a_body_all_heat_goes_through_it():
+    body = BodyHeat(conductance=0.4, capacity=20.0, loss=0.2)
+    embedded = replace(FREE_STROKE, body=body)
+    heat, length = embedded.heat, FREE_STROKE.rest_length
+    assert heat.capacity == FREE_STROKE.heat.capacity
+    assert (heat.loss, heat.conductance) == (0.0, 0.4 * length)
+    assert (heat.body_capacity, heat.body_loss) == (20.0 * length, 0.2 * length)
+    assert embedded.mass == FREE_STROKE.mass
+    for name in ("conductance", "capacity", "loss"):
+        for bad in (0.0, -1.0, math.inf, math.nan, "much"):
+            with pytest.raises(ValueError, match=name):
+                replace(body, **{name: bad})
 
 
 def test_of_length_keeps_thread_and_coil():
     """Mass, coils, heat and contact length are proportional; the geometry does not change."""
-    bare = replace(FREE_STROKE, sheath_capacity=0.2, sheath_area=1e-4)
+    bare = replace(FREE_STROKE, body=BodyHeat(conductance=0.4, capacity=20.0, loss=0.2))
     double = bare.of_length(2.0 * bare.rest_length)
     for name in ("rest_length", "minimum_length", "fibre_length", "coils", "mass"):
         assert getattr(double, name) == pytest.approx(2.0 * getattr(bare, name), rel=1e-14)
     assert double.heat.capacity == pytest.approx(2.0 * bare.heat.capacity, rel=1e-14)
     assert double.heat.time_constant == pytest.approx(bare.heat.time_constant, rel=1e-14)
     assert (double.coil_radius, double.pitch_angle) == (bare.coil_radius, bare.pitch_angle)
-    assert FREE_STROKE.of_length(0.1).sheath_area is None
+    assert double.heat.body_loss == pytest.approx(2.0 * bare.heat.body_loss, rel=1e-14)
+    assert FREE_STROKE.of_length(0.1).body is None
 
 
 @pytest.mark.parametrize(
@@ -101,13 +128,12 @@ def test_of_length_keeps_thread_and_coil():
         ("minimum_pitch_angle", 0.3),
         ("breaking_force", -1.0),
         ("resistance_per_length", math.nan),
-        ("resistance_strain", -0.1),
-        ("resistance_strain", 0.5),  # no resistance left at full stretch
-        ("convection", 0.0),
-        ("roughness", 0.0),
+        ("stretch_resistance", -0.1),
+        ("stretch_resistance", 0.5),  # no resistance left at full stretch
+        ("contraction_resistance", math.inf),
+        ("heat_loss", 0.0),
         ("ambient", -300.0),
-        ("sheath_capacity", -1e-9),
-        ("sheath_area", 0.0),
+        ("body", 0.3),
         ("contact_ratio", 0.0),
         ("contact_smoothing", 0.0),
     ],
@@ -124,7 +150,7 @@ def test_bad_tcas_are_refused(field, value):
         ("young", math.nan),
         ("shear", -1.0),
         ("filament_young", math.inf),
-        ("density", 0.0),
+        ("line_density", 0.0),
         ("specific_heat", 0.0),
         ("softening", -1.0),
         ("softening", 0.1e9),  # nothing left at 160 °C

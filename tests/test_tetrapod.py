@@ -26,7 +26,7 @@ from tca_mj.rod import solve_static
 from tca_mj.rod.beam import torsion_constant
 from tca_mj.routes import parallel
 from tca_mj.sim import Simulation
-from tca_mj.tca import TcaState, law_at
+from tca_mj.tca import law_at
 
 SPEC = TetrapodSpec()
 ACROSS, ALONG = np.diag([1.0, -1.0, 1.0]), np.diag([-1.0, 1.0, 1.0])
@@ -417,8 +417,7 @@ def test_a_mirrored_leg_is_the_mirror_image():
         part = continuum_leg(mirrored=side)
         part.spec.option.gravity = [0.0, 0.0, 0.0]
         sim = Simulation(part)
-        sim.tca = TcaState(np.array([60.0, 140.0, 25.0]), sim.tca.energy_in, sim.tca.energy_lost)
-        sim.step(sim.bank.heat.loss * (sim.temperature - COLD), 1.0)
+        sim.step(sim.keep([60.0, 140.0, 25.0]), 1.0)
         mujoco.mj_kinematics(sim.model, sim.data)
         tips.append(sim.data.site("foot").xpos.copy())
     assert abs(tips[0][1]) > 5e-3

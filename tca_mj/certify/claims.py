@@ -20,7 +20,6 @@ from tca_mj.modules.twisting import TwistingSpec
 from tca_mj.rod import BeamSpec, RodShape, solve_static
 from tca_mj.routes import Helix, Route, UTurn, parallel
 from tca_mj.sim import Simulation
-from tca_mj.tca import TcaState
 
 Array = NDArray[np.float64]
 
@@ -220,8 +219,7 @@ def _returned() -> float:
     start = sim.data.site("tip").xpos.copy()
     for hot, seconds in ((120.0, 3.0), (25.0, 5.0)):
         now = np.array([hot, 25.0, 25.0])
-        sim.tca = TcaState(now, sim.tca.energy_in, sim.tca.energy_lost)
-        sim.step(sim.bank.heat.loss * (now - 25.0), seconds)
+        sim.step(sim.keep(now), seconds)
     return float(np.linalg.norm(sim.data.site("tip").xpos - start))
 
 

@@ -18,7 +18,6 @@ from tca_mj.model.settle import NotSettledError
 from tca_mj.model.smooth import SmoothBody
 from tca_mj.rod.problem import StrandLaw
 from tca_mj.sim import Simulation
-from tca_mj.tca import TcaState
 
 Array = NDArray[np.float64]
 
@@ -128,8 +127,7 @@ def run(
     ambient = 25.0
     for time in np.arange(0.1, _LONGEST, 0.1):
         now = ambient + min(time / _HEATING, 1.0) * (temperature - ambient)
-        sim.tca = TcaState(now, sim.tca.energy_in, sim.tca.energy_lost)
-        sim.step(sim.bank.heat.loss * (now - ambient), 0.1)
+        sim.step(sim.keep(now), 0.1)
         left = float(np.abs(sim.data.qvel).max())
         if time > _HEATING and left < _QUIET:
             break

@@ -103,7 +103,9 @@ def _table(name: str, rows: Rows) -> Array:
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Thermostat:
-    """Power that brings TCAs to a temperature: λ (T* - T_amb) + C (T* - T)/τ, within limits.
+    """Power that brings TCAs to a temperature: what keeps T* + C (T* - T)/τ, within limits.
+
+    What keeps a bare TCA is λ (T* - T_amb); one in a soft body also warms that, G (T* - T_body).
 
     Attributes:
         heat: Thermal constants, arrays of shape (n,).
@@ -126,9 +128,17 @@ class Thermostat:
             if not (np.isfinite(value) & (value > 0.0)).all():
                 raise ValueError(f"{name} must be finite and above 0, got {value}")
 
-    def power(self, temperature: ArrayLike, target: ArrayLike) -> Array:
-        """Power for TCAs at ``temperature`` that ought to be at ``target``, shape (..., n) [W]."""
+    def power(
+        self, temperature: ArrayLike, target: ArrayLike, body: ArrayLike | None = None
+    ) -> Array:
+        """Power for TCAs at ``temperature`` that ought to be at ``target``, shape (..., n) [W].
+
+        Args:
+            temperature: Temperatures, shape (..., n) [°C].
+            target: Wanted ones, same shape [°C].
+            body: Temperatures of what they lie in, same shape; None if that is cold [°C].
+        """
         goal = np.minimum(np.asarray(target, dtype=np.float64), self.max_temperature)
         error = goal - np.asarray(temperature, dtype=np.float64)
-        steady = self.heat.loss * (goal - self.heat.ambient)
+        steady = self.heat.keeping(goal, self.heat.ambient if body is None else body)
         return np.clip(steady + self.heat.capacity * error / self.response, 0.0, self.max_power)

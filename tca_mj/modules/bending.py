@@ -1,6 +1,7 @@
 """The 3D bending module: a silicone cylinder with three parallel TCAs (Sun, Section 4.1.3)."""
 
-from dataclasses import dataclass, field
+import math
+from dataclasses import dataclass, field, replace
 
 from tca_mj.model.chain import beam
 from tca_mj.model.part import Part, new_spec
@@ -8,8 +9,8 @@ from tca_mj.model.tendon import route_passes, route_tca
 from tca_mj.rod.beam import BeamSpec, require_count, require_positive
 from tca_mj.routes import leg_length, parallel
 from tca_mj.tca import CATALOGUE, TcaSpec
+from tca_mj.tca.embedding import SILICONE_DENSITY, silicone_body
 
-SILICONE_DENSITY = 1070.0  # Ecoflex 00-30, data sheet of Smooth-On [kg/m³]
 SILICONE_YOUNG = 0.125e6  # Ecoflex 00-30, Sun, Section 5.3 [Pa]
 SILICONE_SHEAR = SILICONE_YOUNG / 3.0  # incompressible, Sun, Section 5.3 [Pa]
 
@@ -30,15 +31,17 @@ def silicone_cylinder(length: float, diameter: float, outer_diameter: float) -> 
 class BendingSpec:
     """A cylinder with parallel TCAs.
 
-    Two diameters, because the published figures contradict each other: TCAs 4 mm from the
-    centre do not fit a body of 4.5 mm diameter (Sun, Section 5.3.1), yet only the stiffness of
-    that section agrees with the measured angles. So the section that carries load has 4.5 mm
-    and the body that is seen, touched and weighed has 9 mm.
+    The published figures contradict each other: TCAs 4 mm from the centre do not fit a body of
+    4.5 mm diameter (Sun, Section 5.3.1), yet only the stiffness of that section agrees with the
+    measured angles. So the printed 4.5 mm are the section of silicone, which carries load, has
+    weight and takes up heat, and 9 mm are the outline that is seen and touched, without weight.
+    A solid body of 9 mm as soft as one of 4.5 mm could not stand: its weight would be three times
+    what buckles it.
 
     Attributes:
         length: Length of the module [m]. Sun, Section 5.3.1.
-        diameter: Diameter of the section that carries load [m]. Sun, Section 5.3.
-        outer_diameter: Diameter of the body [m]. Estimate: 4.5 mm read as a radius.
+        diameter: Diameter of the section of silicone [m]. Sun, Section 5.3.
+        outer_diameter: Diameter of the outline [m]. Estimate: 4.5 mm read as a radius.
         offset: Distance of the TCAs from the centre line [m]. Sun, Section 5.3.1.
         count: Number of TCAs, at equal angles from the x axis on.
         nodes: Nodes of the chain. With 8 the tip lies within 1 % of the length of theory, with
@@ -65,7 +68,16 @@ class BendingSpec:
     @property
     def body(self) -> BeamSpec:
         """The soft body without its TCAs."""
-        return silicone_cylinder(self.length, self.diameter, self.outer_diameter)
+        beam = silicone_cylinder(self.length, self.diameter, self.outer_diameter)
+        return replace(beam, line_density=SILICONE_DENSITY * math.pi * self.diameter**2 / 4.0)
+
+    @property
+    def embedded(self) -> TcaSpec:
+        """The TCA in its channel, loosely, with its share of the silicone."""
+        return replace(self.tca, body=silicone_body(
+            self.tca, section=math.pi * self.diameter**2 / 4.0 / self.count,
+            perimeter=math.pi * self.outer_diameter / self.count,
+        ))  # fmt: skip
 
 
 def bending_module(spec: BendingSpec | None = None) -> Part:
@@ -84,7 +96,7 @@ def bending_module(spec: BendingSpec | None = None) -> Part:
     tcas = tuple(
         route_tca(
             mjspec,
-            spec.tca.of_length(leg_length(route, spec.length)),
+            spec.embedded.of_length(leg_length(route, spec.length)),
             route_passes(chain, route),
             name=f"tca{i}",
         )

@@ -11,10 +11,11 @@ from dataclasses import dataclass, field, replace
 from tca_mj.model.chain import Chain, beam
 from tca_mj.model.part import Part, new_spec
 from tca_mj.model.tendon import Pass, route_tca
-from tca_mj.modules.bending import SILICONE_DENSITY, SILICONE_YOUNG
+from tca_mj.modules.bending import SILICONE_YOUNG
 from tca_mj.rod.beam import BeamSpec, require_count, require_positive
 from tca_mj.routes import UTurn, leg_length
 from tca_mj.tca import CATALOGUE, TcaSpec
+from tca_mj.tca.embedding import SILICONE_DENSITY, silicone_body
 
 _HALF = math.sqrt(0.5)
 # Rotations of the fingers' bases, wxyz: z to +x or -x of the mount, x (the outside) to its -z.
@@ -44,9 +45,8 @@ class FingerPairSpec:
         nodes: Nodes of each finger. With 8 its tip lies within 1 % of a finger's length of theory,
             opened to a straight body too.
         friction: Sliding friction of the silicone. Estimate.
-        tca: The kind of TCA, cut to the route's length in the closed gripper.
-        sheath_capacity: Heat capacity of the silicone heated with the TCA [J/K]. Estimate; its
-            heat is lost through the fibre's own surface.
+        tca: The kind of TCA, cut to the route's length in the closed gripper. It lies on
+            half the wall of its bent channel.
 
     Raises:
         ValueError: If a dimension is not finite and positive, a number of nodes not whole, or the
@@ -64,7 +64,6 @@ class FingerPairSpec:
     nodes: int = 8
     friction: float = 1.0
     tca: TcaSpec = field(default_factory=lambda: CATALOGUE["free-stroke"])
-    sheath_capacity: float = 0.06
 
     def __post_init__(self) -> None:
         require_positive(
@@ -112,6 +111,14 @@ class FingerPairSpec:
         )
 
     @property
+    def embedded(self) -> TcaSpec:
+        """The TCA in its bent channel, pressed to its wall; each leg has half of the body."""
+        return replace(self.tca, body=silicone_body(
+            self.tca, section=self.thickness * self.width / 2.0,
+            perimeter=self.thickness + self.width, touching=0.5,
+        ))  # fmt: skip
+
+    @property
     def route(self) -> UTurn:
         """The TCA's two legs along one finger."""
         return UTurn.parallel(self.offset, self.half_width)
@@ -154,10 +161,7 @@ def finger_pair(spec: FingerPairSpec | None = None) -> Part:
     )
     routed = route_tca(
         mjspec,
-        replace(
-            spec.tca.of_length(4.0 * leg_length(route.out, body.length, body.curvature)),
-            sheath_capacity=spec.sheath_capacity,
-        ),
+        spec.embedded.of_length(4.0 * leg_length(route.out, body.length, body.curvature)),
         _passes(fingers, route),
         name="tca",
     )

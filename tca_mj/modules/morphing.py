@@ -35,8 +35,6 @@ class MorphingSpec:
         spine: Spine, and where the TCA runs.
         heater: Heater wire, fitted to the module's natural cooling.
         tca: The kind of TCA, cut to twice the spine's length.
-        tube_capacity: Heat capacity of what of the tube is heated with the TCA [J/K]. Estimate: a
-            sixth of the tube; with it 240° take about the reported second.
         mass: Mass of spine, protrusions, tube and wires, without the TCA [kg]. Estimate: 2.2 g of
             epoxy, 1 g of silicone, 0.3 g of wire.
         half_width: Half the distance between the two legs of the U [m]. Estimate.
@@ -54,7 +52,6 @@ class MorphingSpec:
     spine: SpineSpec = field(default_factory=SpineSpec)
     heater: HeaterSpec = field(default_factory=lambda: HeaterSpec.fitted(SpineSpec()))
     tca: TcaSpec = field(default_factory=lambda: CATALOGUE["free-stroke"])
-    tube_capacity: float = 0.12
     mass: float = 3.5e-3
     half_width: float = 1.6e-3
     tip_mass: float = 0.0
@@ -65,9 +62,8 @@ class MorphingSpec:
     def __post_init__(self) -> None:
         require_positive(mass=self.mass, half_width=self.half_width, damping_time=self.damping_time)
         require_count(nodes=self.nodes)
-        for name in ("tube_capacity", "tip_mass"):
-            if not 0.0 <= getattr(self, name) < math.inf:
-                raise ValueError(f"{name} must be finite and at least 0, got {getattr(self, name)}")
+        if not 0.0 <= self.tip_mass < math.inf:
+            raise ValueError(f"tip_mass must be finite and at least 0, got {self.tip_mass}")
         if "bend_x" not in self.motions:
             raise ValueError(f"motions must contain 'bend_x', got {self.motions}")
 
@@ -89,7 +85,7 @@ class MorphingSpec:
     @property
     def sheathed(self) -> TcaSpec:
         """The TCA in its tube."""
-        return sheathed(self.tca, self.spine, self.tube_capacity)
+        return sheathed(self.tca, self.spine)
 
     @property
     def route(self) -> UTurn:

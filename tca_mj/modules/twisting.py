@@ -10,6 +10,7 @@ from tca_mj.modules.bending import silicone_cylinder
 from tca_mj.rod.beam import BeamSpec, require_count, require_positive
 from tca_mj.routes import Helix, Route, UTurn, leg_length
 from tca_mj.tca import CATALOGUE, TcaSpec
+from tca_mj.tca.embedding import silicone_body
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -18,10 +19,11 @@ class TwistingSpec:
 
     Attributes:
         length: Length of the module [m]. Sun, Section 5.3.2.
-        diameter: Diameter of the section that carries load [m]. Estimate: with the printed
-            4.5 mm the double helix would turn less than the single one, against the measurement;
-            that takes more than 4.7 mm, and 5.1 mm in a
-            chain, which does not shear.
+        diameter: Diameter of the section that carries load [m]. Estimate: the circle on which
+            the TCA lies, so that the inner half of the wound tube carries load and the outer half
+            does not. With the printed 4.5 mm the double helix would turn less than the single one,
+            against the measurement; that takes more than 4.7 mm, and 5.1 mm in a chain, which
+            does not shear.
         outer_diameter: Diameter of the body with the wrapped tube [m]. Sun, Section 4.1.4:
             the arm is 10 mm wide.
         radius: Distance of the TCA from the centre line [m]. Sun, Section 5.3.2.
@@ -32,32 +34,41 @@ class TwistingSpec:
         nodes: Nodes of the chain, at least three per turn of each leg. With 8 the double helix is
             exact by a tenth of a per cent at any tension.
         tca: The kind of TCA, cut to the route's length.
-        sheath_capacity: Heat capacity of the elastomer tube round the TCA [J/K]. Fitted to the
-            half turn after 28 W for 2 s (Sun, Section 4.1.2).
-        sheath_area: Surface of that tube, 3.2 mm thick, per length of TCA [m]. Estimate: the
-            tube's whole surface.
+        tube: Outer diameter of the elastomer tube round the TCA [m]. Five rounds "as close as
+            possible" on 16 mm (Sun, Sections 4.1.2 and 5.3.2) are 3.2 mm.
 
     Raises:
         ValueError: If a dimension is not finite and positive, or a number of nodes not whole.
     """
 
     length: float = 16e-3
-    diameter: float = 6e-3
+    diameter: float = 7e-3
     outer_diameter: float = 10e-3
     radius: float = 3.5e-3
     turns: float = 5.0
     double: bool = True
     nodes: int = 8
     tca: TcaSpec = field(default_factory=lambda: CATALOGUE["free-stroke"])
-    sheath_capacity: float = 0.39
-    sheath_area: float = math.pi * 3.2e-3
+    tube: float = 3.2e-3
 
     def __post_init__(self) -> None:
         require_positive(
             length=self.length, diameter=self.diameter, outer_diameter=self.outer_diameter,
-            radius=self.radius, sheath_area=self.sheath_area,
+            radius=self.radius, tube=self.tube,
         )  # fmt: skip
         require_count(nodes=self.nodes)
+        if not self.tube > 2.0 * self.tca.outer_radius:
+            raise ValueError(
+                f"tube must be above the TCA's {2.0 * self.tca.outer_radius} m, got {self.tube}"
+            )
+
+    @property
+    def embedded(self) -> TcaSpec:
+        """The TCA in its wound tube, tightly; half of the tube's outside meets air."""
+        return replace(self.tca, body=silicone_body(
+            self.tca, section=math.pi * (self.tube**2 / 4.0 - self.tca.outer_radius**2),
+            perimeter=math.pi * self.tube / 2.0, touching=1.0,
+        ))  # fmt: skip
 
     @property
     def body(self) -> BeamSpec:
@@ -86,10 +97,6 @@ def twisting_module(spec: TwistingSpec | None = None) -> Part:
     chain = beam(mjspec.worldbody, spec.body, nodes=spec.nodes, name="body")
     chain.tip.add_site(name="tip", pos=[0.0, 0.0, chain.local(spec.nodes)], group=4)
     length = sum(leg_length(leg, spec.length) for leg in spec.route.legs)
-    tca = replace(
-        spec.tca.of_length(length),
-        sheath_capacity=spec.sheath_capacity,
-        sheath_area=spec.sheath_area * length,
-    )
+    tca = spec.embedded.of_length(length)
     routed = route_tca(mjspec, tca, route_passes(chain, spec.route), name="tca")
     return Part(mjspec, (routed,), {"tip": "tip"})

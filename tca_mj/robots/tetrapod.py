@@ -10,7 +10,7 @@ joints all three of them stiffen, each at its own temperature.
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any
 
 import mujoco
@@ -23,13 +23,13 @@ from tca_mj.modules.leg import LegSpec, continuum_leg
 from tca_mj.rod.beam import BeamSpec, Outline, require_count, require_positive
 from tca_mj.routes import Helix, leg_length
 from tca_mj.smp import HeaterSpec, SpineSpec
+from tca_mj.smp.lumped import in_tube
 from tca_mj.tca import CATALOGUE, TcaSpec
 
 LEGS = ("front_left", "front_right", "rear_left", "rear_right")
 SIDES = {"left": 1.0, "right": -1.0}  # the sign of y
 SPINES = 3
 
-TUBE_DIAMETER = 2.5e-3  # outer diameter of a spine's silicone tube, half the module's 5 mm [m]
 # Stiffness of what is round a spine (tube, wires) over that of the soft spine. Estimate.
 _SHEATH = 0.01
 
@@ -43,7 +43,6 @@ class TetrapodSpec:
         spine: A spine, as in the morphing module.
         heater: Heater wire of a spine, fitted to the module's natural cooling.
         tca: The kind of TCA that bends a spine, cut to twice its length.
-        tca_capacity: Heat capacity of the silicone tube heated with a spine's TCA [J/K]. Estimate.
         module_mass: Mass of a spine with tube, wires and protrusions, without the TCA [kg].
             Estimate: 2.2 g of epoxy, 1 g of silicone and 0.3 g of wire.
         spacing: Fore-aft distance of neighbouring spines [m]. Estimate.
@@ -67,7 +66,6 @@ class TetrapodSpec:
     spine: SpineSpec = field(default_factory=SpineSpec)
     heater: HeaterSpec = field(default_factory=lambda: HeaterSpec.fitted(SpineSpec()))
     tca: TcaSpec = field(default_factory=lambda: CATALOGUE["free-stroke"])
-    tca_capacity: float = 0.15
     module_mass: float = 3.5e-3
     spacing: float = 40e-3
     memory_angle: float = math.radians(20.0)
@@ -82,7 +80,7 @@ class TetrapodSpec:
     def __post_init__(self) -> None:
         require_positive(
             **{name: getattr(self, name) for name in (
-                "tca_capacity", "module_mass", "spacing", "rail_length", "rail_width",
+                "module_mass", "spacing", "rail_length", "rail_width",
                 "rail_mass", "leg_station", "leg_height", "belly_friction",
             )}
         )  # fmt: skip
@@ -362,8 +360,4 @@ def route_spine_tca(
 def sheathed(spec: TetrapodSpec, passes: Sequence[Pass]) -> TcaSpec:
     """The TCA that follows passes, in its tube."""
     length = sum(leg_length(p.leg, p.chain.beam.length, p.chain.beam.curvature) for p in passes)
-    return replace(
-        spec.tca.of_length(length),
-        sheath_capacity=spec.tca_capacity,
-        sheath_area=math.pi * TUBE_DIAMETER * length,
-    )
+    return in_tube(spec.tca).of_length(length)

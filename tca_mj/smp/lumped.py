@@ -15,6 +15,7 @@ from tca_mj.smp.fixing import SpineState, advance, spring
 from tca_mj.smp.heater import HeaterSpec, HeaterState, heat_spine
 from tca_mj.smp.material import SpineSpec
 from tca_mj.tca import Pull, TcaBank, TcaSpec, TcaState
+from tca_mj.tca.embedding import silicone_body
 
 Array = NDArray[np.float64]
 
@@ -26,17 +27,23 @@ class ModuleSolveError(ArithmeticError):
     """The balance of the module's torques was not found."""
 
 
-def sheathed(tca: TcaSpec, spine: SpineSpec, tube_capacity: float) -> TcaSpec:
+def in_tube(tca: TcaSpec) -> TcaSpec:
+    """A TCA that lies loosely in its silicone tube, as Sun, Section 6.1.1, makes it."""
+    radius = 0.5 * TUBE_DIAMETER
+    body = silicone_body(
+        tca, section=math.pi * (radius**2 - tca.outer_radius**2), perimeter=2.0 * math.pi * radius,
+    )  # fmt: skip
+    return replace(tca, body=body)
+
+
+def sheathed(tca: TcaSpec, spine: SpineSpec) -> TcaSpec:
     """A TCA in its tube, U-shaped along the spine and unloaded when the spine is straight.
 
     Args:
         tca: The kind of TCA; it is cut to twice the spine's length.
         spine: The spine.
-        tube_capacity: Heat capacity of what of the tube is heated with the TCA [J/K].
     """
-    length = 2.0 * spine.length
-    area = math.pi * TUBE_DIAMETER * length
-    return replace(tca.of_length(length), sheath_capacity=tube_capacity, sheath_area=area)
+    return in_tube(tca).of_length(2.0 * spine.length)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -1,6 +1,6 @@
 """Physics of twisted-and-coiled actuators (TCAs): heat, tension, resistance; n at a time."""
 
-from tca_mj.tca.bank import Pull, TcaBank, TcaState
+from tca_mj.tca.bank import Pull, TcaBank, TcaMelted, TcaState
 from tca_mj.tca.calibration import calibrate
 from tca_mj.tca.catalogue import MODULE_TCAS
 from tca_mj.tca.centreline import CONICAL, Centreline, ConicalTca
@@ -16,9 +16,17 @@ from tca_mj.tca.sensing import WireTable, resistance, sensed_length
 from tca_mj.tca.spec import CATALOGUE, FREE_STROKE_CREPT, FibreSpec, TcaSpec
 from tca_mj.tca.statics import beyond_breaking, hanging_length, law_at, outside_fit, tension
 from tca_mj.tca.surface import CalibrationError, Surface, SurfaceBound
-from tca_mj.tca.thermal import HeatSpec, heat_lost, power_from_voltage, step_temperature
+from tca_mj.tca.thermal import (
+    BodyHeat,
+    HeatSpec,
+    HeatStep,
+    heat_lost,
+    power_from_voltage,
+    step_temperature,
+)
 
 __all__ = [
+    "BodyHeat",
     "CATALOGUE",
     "CONICAL",
     "MODULE_TCAS",
@@ -36,6 +44,7 @@ __all__ = [
     "FibreSpec",
     "FibreTable",
     "HeatSpec",
+    "HeatStep",
     "Heating",
     "Helix",
     "Load",
@@ -47,6 +56,7 @@ __all__ = [
     "Surface",
     "SurfaceBound",
     "TcaBank",
+    "TcaMelted",
     "TcaSpec",
     "TcaState",
     "WireTable",

@@ -1,7 +1,7 @@
 """n TCAs advanced together: heat in, temperature and pull out."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -11,10 +11,31 @@ from tca_mj.tca.arrays import floats
 from tca_mj.tca.coilrod import CoilRods
 from tca_mj.tca.coilsurface import CoilSurfaces
 from tca_mj.tca.sensing import WireTable, resistance
-from tca_mj.tca.spec import TcaSpec
-from tca_mj.tca.thermal import HeatSpec, heat_lost, power_from_voltage, step_temperature
+from tca_mj.tca.spec import TcaSpec, heat_of
+from tca_mj.tca.thermal import HeatStep, power_from_voltage, require_powers
 
 Array = NDArray[np.float64]
+
+
+class TcaMelted(ArithmeticError):
+    """A TCA would be hotter than the temperature at which its fibre melts.
+
+    Attributes:
+        number: Which one, an index of the actuator axis.
+        temperature: How hot it would be [°C].
+    """
+
+    def __init__(self, number: int, temperature: float, melting: float) -> None:
+        super().__init__(number, temperature, melting)
+        self.number, self.temperature, self.melting = number, temperature, melting
+
+    def __str__(self) -> str:
+        return f"TCA {self.number} {self.why}"
+
+    @property
+    def why(self) -> str:
+        """What happened to it, without its name."""
+        return f"would have {self.temperature:.0f} °C: its fibre melts at {self.melting:.0f} °C"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -23,11 +44,13 @@ class TcaState:
 
     Attributes:
         temperature: Temperature [°C].
+        body: Temperature of the body that a TCA lies in; for a bare one that of the air [°C].
         energy_in: Electrical energy taken in since the state of rest [J].
-        energy_lost: Heat given to the air since then [J].
+        energy_lost: Heat given to the air since then, by TCA and body [J].
     """
 
     temperature: Array
+    body: Array
     energy_in: Array
     energy_lost: Array
 
@@ -71,6 +94,8 @@ class TcaBank:
         longest: Longest length that ``pull`` accepts, shape (n,) [m].
         breaking_force: Tensions at which the TCAs break, shape (n,) [N].
         max_temperature: Upper ends of the range of the fibre's measurements, shape (n,) [°C].
+        melting_temperature: Temperatures that no TCA can have, shape (n,) [°C].
+        embedded: Which TCAs lie in a body, shape (n,).
     """
 
     def __init__(self, specs: Sequence[TcaSpec], law: Literal["rod", "surface"] = "rod") -> None:
@@ -95,26 +120,55 @@ class TcaBank:
         self._coils: CoilRods | CoilSurfaces
         self._coils = CoilSurfaces(self.specs) if law == "surface" else CoilRods(self.specs)
         self._wire = WireTable.of(self.specs)
-        heats = [spec.heat for spec in self.specs]
-        self.heat = HeatSpec(
-            capacity=_frozen([heat.capacity for heat in heats]),
-            loss=_frozen([heat.loss for heat in heats]),
-            ambient=_frozen([heat.ambient for heat in heats]),
-        )
+        self.heat = heat_of(self.specs)
+        self._heating: HeatStep | None = None
         self.rest_length = _frozen([spec.rest_length for spec in self.specs])
         self.minimum_length = _frozen([spec.minimum_length for spec in self.specs])
         self.shortest, self.longest = self._coils.shortest, self._coils.longest
         self.breaking_force = _frozen([spec.breaking_force for spec in self.specs])
         self.max_temperature = _frozen([spec.fibre.temperature_range[1] for spec in self.specs])
+        self.melting_temperature = _frozen([s.fibre.melting_temperature for s in self.specs])
+        self.embedded = np.array([spec.body is not None for spec in self.specs])
 
     def rest(self, batch_shape: tuple[int, ...] = ()) -> TcaState:
         """The state at ambient temperature with no energy counted, shape batch_shape + (n,)."""
         shape = (*batch_shape, self.n)
+        ambient = np.broadcast_to(self.heat.ambient, shape)
         return TcaState(
-            temperature=np.broadcast_to(self.heat.ambient, shape).copy(),
+            temperature=ambient.copy(),
+            body=ambient.copy(),
             energy_in=np.zeros(shape),
             energy_lost=np.zeros(shape),
         )
+
+    def steady(self, temperature: ArrayLike) -> tuple[TcaState, Array]:
+        """TCAs that have been at ``temperature`` for long, and the power that keeps them there.
+
+        Args:
+            temperature: Temperatures, at least that of the surroundings, shape (..., n) [°C].
+
+        Returns:
+            The state, its bodies as warm as they get, with no energy counted; and the power,
+            shape (..., n) [W].
+
+        Raises:
+            ValueError: If the shape is wrong or a temperature is below that of the surroundings.
+        """
+        temperature = np.array(floats("temperature", temperature))
+        if temperature.shape[-1:] != (self.n,):
+            raise ValueError(
+                f"temperature must have shape (..., {self.n}), got {temperature.shape}"
+            )
+        ambient = self.heat.ambient
+        if not (np.isfinite(temperature) & (temperature >= ambient)).all():
+            raise ValueError(
+                f"temperature must be finite and at least {ambient}, got {temperature}"
+            )
+        state = replace(
+            self.rest(temperature.shape[:-1]),
+            temperature=temperature, body=self.heat.steady_body(temperature),
+        )  # fmt: skip
+        return state, self.heat.steady_loss * (temperature - ambient)
 
     def pull(self, state: TcaState, length: ArrayLike) -> Pull:
         """Tension law at the present temperature.
@@ -152,13 +206,22 @@ class TcaBank:
         Raises:
             ValueError: If shapes differ, a power or ``dt`` is negative or not finite, or as
                 ``pull``.
+            TcaMelted: If a TCA would be hotter than its ``melting_temperature``.
             CoilSolveError: If the shape of a coil is not found.
         """
         power = self._checked(state, "power", power)
+        require_powers(power)
+        step = self._heating
+        if step is None or step.heat is not self.heat or step.dt != dt:
+            step = self._heating = HeatStep.of(self.heat, dt)
+        temperature, body, lost = step.advance(state.temperature, state.body, power)
+        molten = temperature > self.melting_temperature
+        if molten.any():
+            worst = tuple(int(i) for i in np.argwhere(molten)[0])
+            melting = float(self.melting_temperature[worst[-1]])
+            raise TcaMelted(worst[-1], float(temperature[worst]), melting)
         state = TcaState(
-            temperature=step_temperature(state.temperature, power, self.heat, dt),
-            energy_in=state.energy_in + power * dt,
-            energy_lost=state.energy_lost + heat_lost(state.temperature, power, self.heat, dt),
+            temperature, body, state.energy_in + power * dt, state.energy_lost + lost
         )
         return state, self.pull(state, length)
 
@@ -178,8 +241,10 @@ class TcaBank:
         return power_from_voltage(voltage, self.resistance(state, length))
 
     def energy_stored(self, state: TcaState) -> Array:
-        """Heat stored above ambient, C (T - T_amb), shape (..., n) [J]."""
-        return self.heat.capacity * (state.temperature - self.heat.ambient)
+        """Heat stored above ambient in TCAs and their bodies, shape (..., n) [J]."""
+        heat = self.heat
+        own = heat.capacity * (state.temperature - heat.ambient)
+        return own + heat.body_capacity * (state.body - heat.ambient)
 
     def overheated(self, state: TcaState) -> NDArray[np.bool_]:
         """Whether a TCA is above ``max_temperature``, where the laws extrapolate, (..., n)."""

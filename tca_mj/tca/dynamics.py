@@ -29,8 +29,8 @@ from tca_mj.tca.arrays import floats
 from tca_mj.tca.coilrod import CoilRods
 from tca_mj.tca.loads import GRAVITY, Course, Heating, Load, LoadState, step_times
 from tca_mj.tca.sensing import WireTable, resistance
-from tca_mj.tca.spec import TcaSpec
-from tca_mj.tca.thermal import HeatSpec
+from tca_mj.tca.spec import TcaSpec, heat_of
+from tca_mj.tca.thermal import require_bare
 
 __all__ = [
     "GRAVITY",
@@ -108,7 +108,7 @@ class LoadedTcas:
             resistance: Their resistances; None is the one of the specs.
 
         Raises:
-            ValueError: If ``specs`` is empty.
+            ValueError: If ``specs`` is empty or a TCA lies in a body.
         """
         self.specs = tuple(specs)
         self.n = len(self.specs)
@@ -120,12 +120,8 @@ class LoadedTcas:
         self._law: TensionLaw = rods.tension if law is None else law
         self._wire = WireTable.of(self.specs)
         self._resistance = self._own_resistance if resistance is None else resistance
-        heats = [spec.heat for spec in self.specs]
-        self.heat = HeatSpec(
-            capacity=np.array([heat.capacity for heat in heats]),
-            loss=np.array([heat.loss for heat in heats]),
-            ambient=np.array([heat.ambient for heat in heats]),
-        )
+        self.heat = heat_of(self.specs)
+        require_bare(self.heat)
 
     def rest(self, batch_shape: tuple[int, ...] = ()) -> LoadState:
         """Loaded equilibrium at ambient temperature, shape batch_shape + (n,); errors: ``settle``.

@@ -2,8 +2,10 @@
 
 The silver-coated thread of a TCA with free stroke rises in resistance as it contracts and
 falls as it is stretched, nearly alike at every load and speed [Sun, dissertation, Colorado State
-University, Section 2.3.1]. The law is linear, R = R_0 (1 - c strain), with the strain counted
-from the natural length; it has no temperature term yet, because none has been published.
+University, Section 2.3.1]. The law is R = R_0 (1 - c strain), with the strain counted from the
+natural length and two slopes: a cold TCA that is stretched loses little, 0.55 ohm per 50 %, a
+heated one that contracts gains "~20 %" over its actuation (Section 3.1.1). It has no temperature
+term, because none has been published: temperature and contraction rose together.
 
 Three curves of it are measured there, and two of them disagree with one R(length). The resistance
 of a cold TCA falls as a load stretches it (R-F). But hot TCAs start contracting from different
@@ -36,12 +38,14 @@ class WireTable(NamedTuple):
     Attributes:
         rest_length: Natural length [m].
         rest_resistance: Resistance R_0 at the natural length [ohm].
-        strain_coefficient: Relative fall c of the resistance per unit strain [1].
+        stretch: Relative fall of the resistance per unit strain beyond it [1].
+        contraction: Relative rise of the resistance per unit contraction below it [1].
     """
 
     rest_length: Array
     rest_resistance: Array
-    strain_coefficient: Array
+    stretch: Array
+    contraction: Array
 
     @classmethod
     def of(cls, specs: Sequence[TcaSpec]) -> "WireTable":
@@ -50,7 +54,8 @@ class WireTable(NamedTuple):
         return cls(
             rest_length=rest_length,
             rest_resistance=rest_length * np.array([spec.resistance_per_length for spec in specs]),
-            strain_coefficient=np.array([spec.resistance_strain for spec in specs]),
+            stretch=np.array([spec.stretch_resistance for spec in specs]),
+            contraction=np.array([spec.contraction_resistance for spec in specs]),
         )
 
 
@@ -76,9 +81,10 @@ def resistance(wire: WireTable, length: ArrayLike, temperature: ArrayLike) -> Ar
         raise ValueError(f"length = {length} m must be finite and above 0")
     if not np.isfinite(temperature).all():
         raise ValueError(f"temperature = {temperature} °C must be finite")
-    left = 1.0 - wire.strain_coefficient * (length / wire.rest_length - 1.0)
+    strain = length / wire.rest_length - 1.0
+    left = 1.0 - np.where(strain > 0.0, wire.stretch, wire.contraction) * strain
     if not (left > 0.0).all():
-        bound = wire.rest_length * (1.0 + 1.0 / wire.strain_coefficient)
+        bound = wire.rest_length * (1.0 + 1.0 / wire.stretch)
         raise ValueError(f"length = {length} m must be below {bound} m, where R would be 0")
     return wire.rest_resistance * left
 
@@ -87,7 +93,7 @@ def sensed_length(wire: WireTable, resistance: ArrayLike) -> Array:
     """Length at which n TCAs have a given resistance: the inverse of ``resistance``.
 
     Args:
-        wire: Constants of the n TCAs, strain coefficient above 0.
+        wire: Constants of the n TCAs, both slopes above 0.
         resistance: Resistance, shape (..., n) [ohm].
 
     Returns:
@@ -99,9 +105,11 @@ def sensed_length(wire: WireTable, resistance: ArrayLike) -> Array:
     resistance = floats("resistance", resistance)
     if not ((resistance > 0.0) & (resistance < math.inf)).all():
         raise ValueError(f"resistance = {resistance} ohm must be finite and above 0")
-    if not (wire.strain_coefficient > 0.0).all():
-        raise ValueError(f"strain_coefficient = {wire.strain_coefficient} must be above 0")
-    strain = (1.0 - resistance / wire.rest_resistance) / wire.strain_coefficient
+    for name, slope in (("stretch", wire.stretch), ("contraction", wire.contraction)):
+        if not (slope > 0.0).all():
+            raise ValueError(f"{name} = {slope} must be above 0")
+    fall = 1.0 - resistance / wire.rest_resistance
+    strain = fall / np.where(fall > 0.0, wire.stretch, wire.contraction)
     return wire.rest_length * (1.0 + strain)
 
 
@@ -144,7 +152,8 @@ def resistance_displacement(
 ) -> Array:
     """R-D curve: resistance of n TCAs that have contracted from their loaded, crept length.
 
-    R = R_0 (1 + c D/rest_length - a F + b (T - T_0)). The speed does not count, Sun, Section 2.3.1.
+    R = R_0 (1 + c D/rest_length - a F + b (T - T_0)) with the slope c of contraction. The
+    speed does not count, Sun, Section 2.3.1.
 
     Args:
         wire: Constants of the n TCAs.
@@ -174,7 +183,7 @@ def resistance_displacement(
             raise ValueError(f"{name} = {array} must be finite")
     if not ((load >= 0.0) & (load < math.inf)).all():
         raise ValueError(f"load = {load} N must be finite and not below 0")
-    left = 1.0 + wire.strain_coefficient * displacement / wire.rest_length - sensing.load * load
+    left = 1.0 + wire.contraction * displacement / wire.rest_length - sensing.load * load
     left = left + sensing.temperature * (temperature - sensing.reference_temperature)
     if not (left > 0.0).all():
         raise ValueError(f"displacement = {displacement} m, load = {load} N: no resistance left")

@@ -2,18 +2,21 @@
 
 "Sun" below is J. Sun's dissertation, Colorado State University; its Chapter 2 and its
 Chapter 3 describe threads of the same kind that differ in radius and inserted twist, so
-they are two fibres here.
+they are two fibres here. What was weighed, their mass per length, is a number of its own and does
+not follow from the radius, which is the one that the moduli were fitted with.
 """
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields, replace
 from numbers import Real
 from types import MappingProxyType
 from typing import Literal
 
+import numpy as np
+
 from tca_mj.tca.mandrel import BRILL_TRANSITION, kept_share
-from tca_mj.tca.thermal import HeatSpec
+from tca_mj.tca.thermal import BodyHeat, HeatSpec
 
 _ABSOLUTE_ZERO = -273.15  # [°C]
 
@@ -33,7 +36,8 @@ class FibreSpec:
     """The twisted fibre (thread) of a TCA. Defaults: Sun, Tables 3.1 and Section 3.2.2.
 
     Attributes:
-        radius: Radius r_t of the twisted fibre when cold [m].
+        radius: Radius r_t of the circle that carries load, when cold: the moduli were fitted with
+            it (Sun, Table 3.1). Fibre measured across is 0.34 mm thick [m].
         young: Measured longitudinal Young's modulus E at the reference temperature [Pa].
         shear: Measured longitudinal shear modulus G at the reference temperature [Pa].
         filament_young: Young's modulus E_f0 of the filament, nylon 6,6 [Pa].
@@ -49,7 +53,10 @@ class FibreSpec:
             Gamma(T) = c2 T^2 + c1 T + c0 with T in °C, Sun, Section 3.1.2. The constant term
             is the one near 1. The laws divide Gamma by its value at the
             reference temperature, so that a cold TCA is at rest.
-        density: Mass per volume of the fibre [kg/m^3].
+        line_density: Mass per length of twisted fibre [kg/m]. The thread is sold as 235/36 dtex,
+            4 ply, 94 mg per metre, and 218 mm of it become 175 mm (Sun, Section 2.1.1 and Table
+            3.2): 117 mg/m. The other printed data agree, 1300 kg/m^3 (Table 3.1) on 0.34 mm
+            (Table 2.1) is 118 mg/m; on the circle that carries load it would be 180 mg/m.
         specific_heat: Heat capacity per mass [J/(kg K)].
         reference_temperature: Temperature T_0 at which the TCA has its natural shape [°C].
         temperature_range: Lowest and highest temperature of the measurements behind
@@ -69,7 +76,7 @@ class FibreSpec:
     inserted_twist: float = 4710.0
     untwist_scale: float = 1.0
     expansion: tuple[float, float, float] = (3.5e-6, -6.7e-5, 1.0)
-    density: float = 1300.0
+    line_density: float = 4 * 23.5e-6 * 218.0 / 175.0
     specific_heat: float = 1267.0
     reference_temperature: float = 25.0
     temperature_range: tuple[float, float] = (25.0, 160.0)
@@ -77,7 +84,8 @@ class FibreSpec:
     section: Literal["cold", "hot"] = "cold"
 
     def __post_init__(self) -> None:
-        for name in ("radius", "young", "shear", "filament_young", "density", "specific_heat"):
+        for name in ("radius", "young", "shear", "filament_young", "line_density",
+                     "specific_heat"):  # fmt: skip
             _require(name, getattr(self, name), above=0.0)
         for name in ("softening", "inserted_twist", "untwist_scale"):
             _require_not_negative(name, getattr(self, name))
@@ -156,14 +164,18 @@ class TcaSpec:
         breaking_force: Tension at which the TCA breaks, Sun, Section 2.1.1, type 2-200 [N].
         resistance_per_length: Electrical resistance per *natural length* of the TCA (not per
             fibre length), Sun, Table 2.3: 6.7 ohm/dm [ohm/m].
-        resistance_strain: Relative fall of the resistance per unit strain. Sun, Section 2.3.1:
-            0.55 ohm for 50 % on a TCA of 110 mm, which has 7.37 ohm: 0.55/7.37/0.5.
-        convection: Heat transfer coefficient h to still air, Sun, Table 3.1 [W/(m^2 K)].
-        roughness: Factor c_s of the fibre's true surface over 2 pi r_t l_t, Sun, Section 3.1.1.
+        stretch_resistance: Relative fall of the resistance per unit strain of a TCA that is
+            stretched beyond its natural length. Sun, Section 2.3.1: 0.55 ohm for 50 % on a cold
+            TCA of 110 mm, which has 7.37 ohm: 0.55/7.37/0.5 [1].
+        contraction_resistance: Relative rise of the resistance per unit contraction below the
+            natural length. Fitted to "~20 %" over the actuation (Sun, Section 3.1.1), which is the
+            free stroke of 35.7 % (Table 2.1) [1].
+        heat_loss: Heat lost to still air per length of *fibre* and excess temperature of a bare
+            TCA, h c_s 2 pi r_t. Sun, Table 3.1 and Section 3.1.1: h = 23 W/(m^2 K), c_s = 2.5, r_t
+            = 0.21 mm. Only the product was identified, by a regression (Section 3.5.2), so that it
+            is one number here, and the same for all TCAs of this thread [W/(m K)].
         ambient: Temperature of the surroundings [°C].
-        sheath_capacity: Heat capacity of a sheath or tube heated with the TCA [J/K].
-        sheath_area: Surface through which a sheathed TCA loses its heat, in place of the
-            fibre's own; None for a bare TCA [m^2].
+        body: The soft body that the TCA lies in and gives its heat to; None for a bare TCA.
         contact_ratio: Stiffness of touching coils over that of the cold coil: an estimate.
         contact_smoothing: Range over which the contact sets in, as a share of the minimum
             length: an estimate.
@@ -176,31 +188,30 @@ class TcaSpec:
     minimum_pitch_angle: float
     breaking_force: float = 0.78
     resistance_per_length: float = 67.0
-    resistance_strain: float = 0.55 / (67.0 * 0.110) / 0.5
-    convection: float = 23.0
-    roughness: float = 2.5
+    stretch_resistance: float = 0.55 / (67.0 * 0.110) / 0.5
+    contraction_resistance: float = 0.20 / 0.357
+    heat_loss: float = 23.0 * 2.5 * 2.0 * math.pi * 0.21e-3
     ambient: float = 25.0
-    sheath_capacity: float = 0.0
-    sheath_area: float | None = None
+    body: BodyHeat | None = None
     contact_ratio: float = 50.0
     contact_smoothing: float = 0.005
 
     def __post_init__(self) -> None:
-        for name in ("fibre_length", "breaking_force", "resistance_per_length", "convection",
-                     "roughness", "contact_ratio"):  # fmt: skip
+        for name in ("fibre_length", "breaking_force", "resistance_per_length", "heat_loss",
+                     "contact_ratio"):  # fmt: skip
             _require(name, getattr(self, name), above=0.0)
         _require("coil_radius (spring index above 1)", self.coil_radius, above=self.fibre.radius)
         _require("pitch_angle", self.pitch_angle, above=0.0, below=math.pi / 2.0)
         _require("minimum_pitch_angle", self.minimum_pitch_angle, above=0.0, below=self.pitch_angle)
         _require("ambient", self.ambient, above=_ABSOLUTE_ZERO)
         _require("contact_smoothing", self.contact_smoothing, above=0.0, below=1.0)
-        _require_not_negative("sheath_capacity", self.sheath_capacity)
-        if self.sheath_area is not None:
-            _require("sheath_area", self.sheath_area, above=0.0)
-        _require_not_negative("resistance_strain", self.resistance_strain)
-        if not self.resistance_strain * (1.0 / math.sin(self.pitch_angle) - 1.0) < 1.0:
+        for name in ("stretch_resistance", "contraction_resistance"):
+            _require_not_negative(name, getattr(self, name))
+        if not isinstance(self.body, BodyHeat | None):
+            raise ValueError(f"body = {self.body!r} must be a BodyHeat or None")
+        if not self.stretch_resistance * (1.0 / math.sin(self.pitch_angle) - 1.0) < 1.0:
             raise ValueError(
-                f"resistance_strain = {self.resistance_strain} leaves no resistance at full "
+                f"stretch_resistance = {self.stretch_resistance} leaves no resistance at full "
                 f"stretch; it must be below {1.0 / (1.0 / math.sin(self.pitch_angle) - 1.0)}"
             )
 
@@ -283,32 +294,32 @@ class TcaSpec:
         return self.winding * self.fibre_length / (2.0 * math.pi)
 
     @property
+    def outer_radius(self) -> float:
+        """Radius of the coil's outer surface [m]."""
+        return self.coil_radius + self.fibre.radius
+
+    @property
     def mass(self) -> float:
-        """Mass of the fibre, without a sheath [kg]."""
-        return self.fibre.density * self.fibre.area * self.fibre_length
+        """Mass of the fibre, without a body [kg]."""
+        return self.fibre.line_density * self.fibre_length
 
     @property
     def heat(self) -> HeatSpec:
-        """Lumped thermal constants, Sun, eq. (3.1); with a sheath the loss is h sheath_area."""
-        area = self.sheath_area
-        if area is None:
-            area = self.roughness * 2.0 * math.pi * self.fibre.radius * self.fibre_length
+        """Lumped thermal constants, Sun, eq. (3.1); in a body all heat goes through that."""
+        capacity, length, body = self.mass * self.fibre.specific_heat, self.rest_length, self.body
+        if body is None:
+            loss = self.heat_loss * self.fibre_length
+            return HeatSpec(capacity=capacity, loss=loss, ambient=self.ambient)
         return HeatSpec(
-            capacity=self.mass * self.fibre.specific_heat + self.sheath_capacity,
-            loss=self.convection * area,
-            ambient=self.ambient,
-        )
+            capacity=capacity, loss=0.0, ambient=self.ambient,
+            conductance=body.conductance * length, body_capacity=body.capacity * length,
+            body_loss=body.loss * length,
+        )  # fmt: skip
 
     def of_length(self, rest_length: float) -> "TcaSpec":
-        """A piece of the same coil (and sheath) with another natural length [m]."""
+        """A piece of the same coil (in the same body) with another natural length [m]."""
         _require("rest_length", rest_length, above=0.0)
-        scale = rest_length / self.rest_length
-        return replace(
-            self,
-            fibre_length=scale * self.fibre_length,
-            sheath_capacity=scale * self.sheath_capacity,
-            sheath_area=None if self.sheath_area is None else scale * self.sheath_area,
-        )
+        return replace(self, fibre_length=rest_length / self.rest_length * self.fibre_length)
 
     def of_pitch(self, pitch_angle: float) -> "TcaSpec":
         """The same coil crept to another natural pitch angle [rad]; it keeps its turns.
@@ -320,10 +331,25 @@ class TcaSpec:
         return replace(self, pitch_angle=pitch_angle, coil_radius=radius)
 
 
+def heat_of(specs: Sequence[TcaSpec]) -> HeatSpec:
+    """Thermal constants of n TCAs, fields of shape (n,) that cannot be written to."""
+    heats = [spec.heat for spec in specs]
+    columns = {}
+    for field in fields(HeatSpec):
+        column = np.array([getattr(heat, field.name) for heat in heats], dtype=np.float64)
+        column.setflags(write=False)
+        columns[field.name] = column
+    return HeatSpec(**columns)
+
+
 # Sun, Section 2.1.1 and Table 2.1: thread of 0.34 mm diameter with 287 turns on 350 mm. The
 # moduli and the expansion are those of Chapter 3. The influence of the load is left out: it was
 # fitted to a fibre of 0.21 mm, and this one reaches the end of that fit, 171 rad/m, at 0.31 N.
-_THREAD_2 = FibreSpec(radius=0.17e-3, inserted_twist=2.0 * math.pi * 287.0 / 0.350)
+# Five TCAs weigh 0.16 g, one 0.03 g: 32 mg on 350 mm, as weighed. (350 mm of the thread before it
+# is twisted would be 33 mg, 350 mm after it, as the lengths of Table 2.1 need, 41 mg.)
+_THREAD_2 = FibreSpec(
+    radius=0.17e-3, inserted_twist=2.0 * math.pi * 287.0 / 0.350, line_density=32e-6 / 0.350
+)
 # Sun, Table 3.1 (radius 0.21 mm, 4.71 rad/mm).
 _THREAD_3 = FibreSpec(load_softening=(3.24e-4, -0.027, 1.0))
 

@@ -1,12 +1,26 @@
-"""Heat balance of a TCA: one temperature, Joule heat in, convection out, solved exactly."""
+"""Heat balance of a TCA: Joule heat in, convection out, solved exactly.
+
+A bare TCA has one temperature. One that lies in a soft body has two, its own and that of the body
+round it: the heat of the TCA goes into the body, and the body's to the air.
+
+    C dT/dt     = P - λ (T - T_amb) - G (T - T_body)
+    C_b dT_b/dt = G (T - T_body) - λ_b (T_body - T_amb)
+
+Without conductance G the TCA is alone, with an infinite one the two are a single body of capacity
+C + C_b and loss λ + λ_b.
+"""
 
 import math
 from dataclasses import dataclass
+from numbers import Real
+from typing import NamedTuple, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tca_mj.tca.arrays import floats
+
+Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -15,30 +29,215 @@ class HeatSpec:
 
     Attributes:
         capacity: Heat capacity C of the whole actuator [J/K].
-        loss: Heat-transfer coefficient times surface, λ [W/K].
+        loss: Heat-transfer coefficient times surface, from the TCA straight to the air, λ [W/K];
+            0 only for a TCA in a body.
         ambient: Temperature of the surroundings [°C].
+        conductance: Between TCA and body, G; 0 for a bare TCA [W/K].
+        body_capacity: Heat capacity C_b of the body; without conductance it has no meaning [J/K].
+        body_loss: Heat-transfer coefficient times surface of the body, λ_b [W/K].
+
+    Raises:
+        ValueError: If a number is out of range, or heat cannot leave the TCA.
     """
 
-    capacity: float | NDArray[np.float64]
-    loss: float | NDArray[np.float64]
-    ambient: float | NDArray[np.float64] = 25.0
+    capacity: float | Array
+    loss: float | Array
+    ambient: float | Array = 25.0
+    conductance: float | Array = 0.0
+    body_capacity: float | Array = 1.0
+    body_loss: float | Array = 0.0
 
     def __post_init__(self) -> None:
-        for name, low in (("capacity", 0.0), ("loss", 0.0), ("ambient", -273.15)):
+        for name, low, least in (
+            ("capacity", 0.0, False), ("loss", 0.0, True), ("ambient", -273.15, False),
+            ("conductance", 0.0, True), ("body_capacity", 0.0, False), ("body_loss", 0.0, True),
+        ):  # fmt: skip
             value = floats(name, getattr(self, name))
-            if not np.all((value > low) & np.isfinite(value)):
-                raise ValueError(f"{name} = {value} must be finite and above {low}")
+            if not np.all(((value > low) | (least & (value == low))) & np.isfinite(value)):
+                bound = f"not below {low}" if least else f"above {low}"
+                raise ValueError(f"{name} = {value} must be finite and {bound}")
+        if not np.all(floats("loss", self.loss) + self.conductance > 0.0):
+            raise ValueError(f"loss = {self.loss} must be above 0 where there is no conductance")
 
     @property
-    def time_constant(self) -> float | NDArray[np.float64]:
-        """C/λ [s]."""
-        return self.capacity / self.loss
+    def time_constant(self) -> float | Array:
+        """C/(λ + G): of the TCA, while the body keeps its temperature [s]."""
+        return self.capacity / (self.loss + self.conductance)
+
+    @property
+    def steady_loss(self) -> float | Array:
+        """Power per excess temperature in the steady state, λ + G λ_b/(G + λ_b) [W/K]."""
+        series = np.asarray(self.conductance + self.body_loss)
+        through = self.conductance * self.body_loss / np.where(series > 0.0, series, 1.0)
+        return self.loss + through
+
+    def steady_body(self, temperature: ArrayLike) -> Array:
+        """Temperature of the body once TCAs have been at ``temperature`` for long, (..., n) [°C].
+
+        The body of a bare TCA has that of the surroundings, one without loss that of the TCA.
+        """
+        series = np.asarray(self.conductance + self.body_loss)
+        share = self.conductance / np.where(series > 0.0, series, 1.0)
+        return self.ambient + share * (floats("temperature", temperature) - self.ambient)
+
+    def body_after(self, body: ArrayLike, temperature: ArrayLike, dt: float) -> Array:
+        """Temperature of bodies after ``dt`` with their TCAs at ``temperature``, (..., n) [°C].
+
+        Whoever sees the TCAs alone can so follow what they lie in. That of a bare TCA stays.
+        """
+        series = np.asarray(self.conductance + self.body_loss)
+        rate = np.where(np.asarray(self.conductance) > 0.0, series / self.body_capacity, 0.0)
+        gap = self.steady_body(temperature) - floats("body", body)
+        return body - gap * np.expm1(-rate * dt)
+
+    def keeping(self, temperature: ArrayLike, body: ArrayLike) -> Array:
+        """Power that keeps TCAs at ``temperature`` while the body has ``body``, (..., n) [W].
+
+        It is negative where the surroundings are hotter than the TCA.
+        """
+        temperature = floats("temperature", temperature)
+        to_air = self.loss * (temperature - self.ambient)
+        return to_air + self.conductance * (temperature - floats("body", body))
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class BodyHeat:
+    """The soft body round a TCA, per natural length of the TCA.
+
+    Attributes:
+        conductance: Between TCA and body, g [W/(m K)].
+        capacity: Heat capacity of the body [J/(m K)].
+        loss: Heat lost to the air per excess temperature of the body [W/(m K)].
+
+    Raises:
+        ValueError: If a number is not finite and positive.
+    """
+
+    conductance: float
+    capacity: float
+    loss: float
+
+    def __post_init__(self) -> None:
+        for name in ("conductance", "capacity", "loss"):
+            value = getattr(self, name)
+            if not (isinstance(value, Real) and 0.0 < value < math.inf):
+                raise ValueError(f"{name} = {value!r} must be finite and above 0")
+
+
+class HeatStep(NamedTuple):
+    """What a step does to TCAs and their bodies: linear in temperatures and power, and exact.
+
+    Attributes:
+        heat: Thermal constants.
+        dt: Length of the step [s].
+        own, body_own: Change of an excess over the surroundings by itself, over that excess [1].
+        mixed: What the excess of one adds to the other, over both and over the capacity of the
+            one that it comes from [K/J].
+        warmed, body_warmed: Rise of TCA and body per power [K/W].
+        lost, body_lost: Heat given to the air per excess of TCA and body at the start [J/K].
+        passed: Heat given to the air per power [J/W].
+    """
+
+    heat: HeatSpec
+    dt: float
+    own: Array
+    body_own: Array
+    mixed: Array
+    warmed: Array
+    body_warmed: Array
+    lost: Array
+    body_lost: Array
+    passed: Array
+
+    @classmethod
+    def of(cls, heat: HeatSpec, dt: float) -> Self:
+        """The step of length ``dt`` [s]: the matrix exponential of the two balances.
+
+        Scaled by the roots of the capacities the balances are symmetric: two modes, a fast and a
+        slow one, that decay with real rates. The slow rate is the determinant over the fast one,
+        and no difference of nearly equal numbers is taken, however far apart the rates are.
+
+        Raises:
+            ValueError: If ``dt`` is negative or not finite.
+        """
+        if not 0.0 <= dt < math.inf:
+            raise ValueError(f"dt = {dt} must be finite and not below 0")
+        capacity, body = np.asarray(heat.capacity), np.asarray(heat.body_capacity)
+        loss, out, through = heat.loss, heat.body_loss, heat.conductance
+        first, second = (loss + through) / capacity, (out + through) / body
+        coupling = through / np.sqrt(capacity * body)
+        half = 0.5 * (first - second)
+        root = np.hypot(half, coupling)
+        fast = 0.5 * (first + second) + root
+        product = (loss * out + through * (loss + out)) / (capacity * body)
+        slow = product / np.where(fast > 0.0, fast, 1.0)
+        # Shares of the fast mode in the TCA, of the slow one there, and what they exchange.
+        safe = np.where(root > 0.0, root, 1.0)
+        large = np.where(root > 0.0, 0.5 * (root + np.abs(half)) / safe, 1.0)
+        small = 0.25 * coupling * coupling / (safe * safe * large)
+        share = np.where(half >= 0.0, large, small)
+        other = np.where(half >= 0.0, small, large)
+        exchange = 0.5 * coupling / safe
+
+        left = np.expm1(-fast * dt), np.expm1(-slow * dt)
+        once = _integral(fast, dt), _integral(slow, dt)
+        twofold = _second_integral(fast, dt), _second_integral(slow, dt)
+
+        def matrix(f: tuple[Array, Array]) -> tuple[Array, Array, Array]:
+            fast_one, slow_one = f
+            return (
+                share * fast_one + other * slow_one,
+                exchange * (slow_one - fast_one) / np.sqrt(capacity * body),
+                other * fast_one + share * slow_one,
+            )
+
+        own, mixed, body_own = matrix(left)
+        held, swapped, stayed = matrix(once)
+        rose, crossed, _ = matrix(twofold)
+        return cls(
+            heat=heat, dt=dt, own=own, body_own=body_own, mixed=mixed,
+            warmed=held / capacity, body_warmed=swapped,
+            lost=loss * held + out * capacity * swapped,
+            body_lost=loss * body * swapped + out * stayed,
+            passed=loss * rose / capacity + out * crossed,
+        )  # fmt: skip
+
+    def advance(
+        self, temperature: Array, body: Array, power: Array
+    ) -> tuple[Array, Array, Array]:
+        """Temperatures of TCA and body at the end, shape (..., n) [°C]; heat lost meanwhile [J].
+
+        The heat is the integral of the balances and not the difference of energy in and energy
+        stored, so that the sum of the three remains a check. Nothing is checked here.
+        """
+        heat = self.heat
+        ambient = heat.ambient
+        x, y = temperature - ambient, body - ambient
+        # Changes, so that what is at rest stays there to the bit.
+        hotter = self.own * x + heat.body_capacity * self.mixed * y + self.warmed * power
+        warmer = self.body_own * y + heat.capacity * self.mixed * x + self.body_warmed * power
+        lost = self.lost * x + self.body_lost * y + self.passed * power
+        return temperature + hotter, body + warmer, lost
+
+
+def _integral(rate: Array, dt: float) -> Array:
+    """∫ exp(-rate t) dt from 0 to ``dt``."""
+    safe = np.where(rate > 0.0, rate, 1.0)
+    return np.where(rate > 0.0, -np.expm1(-safe * dt) / safe, dt)
+
+
+def _second_integral(rate: Array, dt: float) -> Array:
+    """The integral of that: (dt - ∫ exp(-rate t) dt)/rate, by its series where that is small."""
+    z = rate * dt
+    series = 0.5 - z / 6.0 * (1.0 - z / 4.0 * (1.0 - z / 5.0 * (1.0 - z / 6.0 * (1.0 - z / 7.0))))
+    safe = np.where(rate > 0.0, rate, 1.0)
+    return np.where(z < 5e-3, series * dt * dt, (dt - _integral(rate, dt)) / safe)
 
 
 def step_temperature(
     temperature: ArrayLike, power: ArrayLike, heat: HeatSpec, dt: float
-) -> NDArray[np.float64]:
-    """Advances the temperature by ``dt`` under constant power, exactly.
+) -> Array:
+    """Advances the temperature of what is bare by ``dt`` under constant power, exactly.
 
     Solves C dT/dt = P - λ (T - T_amb) [Sun, dissertation, Colorado State University, eq. (3.1);
     Yip & Niemeyer, IEEE T-RO 33(3), 2017] in closed form, so that any ``dt`` is stable and two
@@ -47,24 +246,25 @@ def step_temperature(
     Args:
         temperature: Temperature T at the start of the step, shape (..., n) [°C].
         power: Electrical power P, shape (..., n), not negative [W].
-        heat: Thermal constants, scalars or of shape (n,).
+        heat: Thermal constants, scalars or of shape (n,), without a body.
         dt: Length of the step, not negative [s].
 
     Returns:
         Temperature at the end of the step, shape (..., n) [°C].
 
     Raises:
-        ValueError: If a power is negative (a heater cannot cool), if ``dt`` is negative, or if
-            any of the numbers is not finite.
+        ValueError: If a power is negative (a heater cannot cool), if ``dt`` is negative, if there
+            is a body, or if any of the numbers is not finite.
     """
     temperature, power = _checked(temperature, power, dt)
+    require_bare(heat)
     settled = heat.ambient + power / heat.loss
     return temperature - (settled - temperature) * np.expm1(-dt * heat.loss / heat.capacity)
 
 
 def heat_lost(
     temperature: ArrayLike, power: ArrayLike, heat: HeatSpec, dt: float
-) -> NDArray[np.float64]:
+) -> Array:
     """Heat given to the surroundings during a step, ∫ λ (T - T_amb) dt, exactly.
 
     This is the integral of the temperature's course in closed form and not the difference of
@@ -73,7 +273,7 @@ def heat_lost(
     Args:
         temperature: Temperature T at the start of the step, shape (..., n) [°C].
         power: Electrical power P during the step, shape (..., n), not negative [W].
-        heat: Thermal constants, scalars or of shape (n,).
+        heat: Thermal constants, scalars or of shape (n,), without a body.
         dt: Length of the step, not negative [s].
 
     Returns:
@@ -83,13 +283,37 @@ def heat_lost(
         ValueError: As ``step_temperature``.
     """
     temperature, power = _checked(temperature, power, dt)
+    require_bare(heat)
     # The start's excess dies out, the power's builds up: T - T_amb = x e + (P/λ) (1 - e).
     died_out = -np.expm1(-dt * heat.loss / heat.capacity)
     of_start = heat.capacity * (temperature - heat.ambient) * died_out
     return of_start + power * (dt - heat.time_constant * died_out)
 
 
-def power_from_voltage(voltage: ArrayLike, resistance: ArrayLike) -> NDArray[np.float64]:
+def require_bare(heat: HeatSpec) -> None:
+    """Refuses constants of TCAs that lie in a body.
+
+    Raises:
+        ValueError: If there is a conductance to a body.
+    """
+    if np.any(np.asarray(heat.conductance) > 0.0):
+        raise ValueError(
+            f"conductance = {heat.conductance} must be 0 here: a bare TCA has one temperature;"
+            " HeatStep has two"
+        )
+
+
+def require_powers(power: Array) -> None:
+    """Refuses powers that are negative or not finite.
+
+    Raises:
+        ValueError: If there is one.
+    """
+    if not ((power >= 0.0) & (power < math.inf)).all():
+        raise ValueError(f"power = {power} must be finite and not below 0: a heater cannot cool")
+
+
+def power_from_voltage(voltage: ArrayLike, resistance: ArrayLike) -> Array:
     """Joule heat V^2/R of a voltage across a resistance, broadcast together.
 
     Args:
@@ -117,13 +341,12 @@ def power_from_voltage(voltage: ArrayLike, resistance: ArrayLike) -> NDArray[np.
 
 def _checked(
     temperature: ArrayLike, power: ArrayLike, dt: float
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+) -> tuple[Array, Array]:
     temperature = floats("temperature", temperature)
     power = floats("power", power)
     if not np.isfinite(temperature).all():
         raise ValueError(f"temperature = {temperature} must be finite")
-    if not ((power >= 0.0) & (power < math.inf)).all():
-        raise ValueError(f"power = {power} must be finite and not below 0: a heater cannot cool")
+    require_powers(power)
     if not 0.0 <= dt < math.inf:
         raise ValueError(f"dt = {dt} must be finite and not below 0")
     return temperature, power
