@@ -7,6 +7,8 @@ BIN = $(VENV)/bin
 INSTALLED = $(VENV)/.installed
 UNFINISHED = $(VENV)/.unfinished
 DEMO = runs/demo
+# Where PyTorch's CPU build is found: PyPI's, on Linux, brings 5 GB of CUDA.
+TORCH_INDEX ?= https://download.pytorch.org/whl/cpu
 
 .PHONY: help demo test bench lint clean
 
@@ -49,6 +51,10 @@ $(INSTALLED): pyproject.toml constraints.txt
 	    rm -rf $(VENV) && mkdir $(VENV) && : >$(UNFINISHED) && $(PYTHON) -m venv $(VENV); \
 	fi
 	@rm -f $(INSTALLED)
+	@$(BIN)/python -c 'import torch' 2>/dev/null || $(BIN)/python -m pip install --quiet \
+	    --disable-pip-version-check --retries 0 --timeout 15 -c constraints.txt \
+	    --index-url $(TORCH_INDEX) --no-deps torch 2>/dev/null || \
+	    echo "no CPU build of PyTorch at $(TORCH_INDEX): pip looks elsewhere"
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check \
 	    -c constraints.txt -e '.[demo,rl,dev]'
 	@: >$(INSTALLED)

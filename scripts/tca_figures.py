@@ -8,9 +8,10 @@ import numpy as np
 from matplotlib.figure import Figure
 from scipy.optimize import brentq
 
-from tca_mj.modules.twisting import twisting_module
+from tca_mj.modules.bending import BendingSpec
+from tca_mj.modules.twisting import TwistingSpec
 from tca_mj.plots import temperature_colour
-from tca_mj.tca import CATALOGUE, CoilRods, TcaSpec, coil_tension, step_temperature
+from tca_mj.tca import CATALOGUE, CoilRods, HeatStep, TcaBank, TcaSpec, coil_tension
 
 COLOURS = {"type-0-180": "#56b4e9", "type-1-180": "#0072b2", "type-2-200": "#009e73",
            "free-stroke": "#d55e00", "self-coiled": "#8a4fa3"}  # fmt: skip
@@ -84,19 +85,28 @@ def draw_stroke(figure: Figure) -> None:
 
 
 def draw_heat(figure: Figure) -> None:
-    axis, sheathed, time = figure.subplots(), twisting_module().tcas[0].spec, np.arange(1501) / 10.0
-    axis.set(xlabel="time [s]", ylabel="temperature [°C]", xlim=(0, 150), ylim=(20, 105))
-    axis.axvspan(0, 60, color="#f7efe2")
-    bare = replace(sheathed, sheath_capacity=0.0, sheath_area=None)
-    for spec, colour, name in ((bare, "#d55e00", "bare"), (sheathed, "#0072b2", "in its sheath")):
-        course, tau = [25.0], float(spec.heat.time_constant)
+    """Three ways in which 45 mm of TCA lie, heated by the same power."""
+    axis, time = figure.subplots(), np.arange(401) / 10.0
+    axis.set(xlabel="time [s]", ylabel="temperature [°C]", xlim=(0, 40), ylim=(20, 140))
+    axis.axvspan(0, 10, color="#f7efe2")
+    bare = CATALOGUE["free-stroke"]
+    loose, tight = BendingSpec().embedded, TwistingSpec().embedded
+    for spec, colour, name in (
+        (bare, "#d55e00", "bare"), (loose, "#0072b2", "loosely in the bending module"),
+        (tight, "#009e73", "in the wrist's wound tube"),
+    ):  # fmt: skip
+        bank = TcaBank([spec.of_length(0.045)])
+        state, step, course = bank.rest(), HeatStep.of(bank.heat, 0.1), [[25.0, 25.0]]
+        hot, body = state.temperature, state.body
         for start in time[:-1]:
-            course.append(float(step_temperature(course[-1], 2.0 * (start < 60), spec.heat, 0.1)))
-        axis.plot(time, course, color=colour, lw=2, label=f"{name}, time constant {tau:.1f} s")
-        marks = np.array([tau, 60.0 + tau])
-        axis.plot(marks, np.interp(marks, time, course), "o", color=colour)
-    axis.text(30, 100, "2 W", fontsize=9, ha="center")
-    axis.text(105, 100, "off; a dot stands after one time constant", fontsize=9, ha="center")
+            hot, body, _ = step.advance(hot, body, np.full(1, 1.2 * (start < 10.0)))
+            course.append([hot[0], body[0]])
+        own, around = np.transpose(course)
+        axis.plot(time, own, color=colour, lw=2, label=name)
+        if spec.body is not None:
+            axis.plot(time, around, color=colour, lw=1.3, ls=":")
+    axis.text(5, 134, "1.2 W", fontsize=9, ha="center")
+    axis.text(25, 134, "off; dotted: the silicone round the TCA", fontsize=9, ha="center")
     axis.legend(loc="center right", frameon=False)
 
 

@@ -131,8 +131,8 @@ def rollout_plot(
         bend: Bend angle of the body, shape (frames,) [deg].
         names: Names of the n TCAs.
         events: Time [s] and short text of what happened, in any order.
-        body: Temperature of what the TCAs lie in, shape (frames, n) [°C], drawn dotted beside theirs;
-            None, or NaN for a bare TCA, is not drawn.
+        body: Temperature of what the TCAs lie in, shape (frames, n) [°C], drawn dotted beside
+            theirs; None, or NaN for a bare TCA, is not drawn.
         title: Title above the plot.
         temperature_limit: Temperature drawn as a limit [°C], None for no line.
         tension_limit: Tension drawn as a limit [N], None for no line.

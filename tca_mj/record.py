@@ -14,8 +14,8 @@ Entities:
   by kind. The geoms of MuJoCo's own world body are ``/world/scene``.
 * ``/world/tca/<name>``: path of a TCA.
 * ``/actuators/<name>/{power,temperature,tension,length,resistance}``: W, °C, N, m, ohm.
-* ``/actuators/<name>/body_temperature`` of what a TCA lies in, if it is not bare: °C. When a TCA gets
-  hotter than what its law was measured at, or colder again, an event says so.
+* ``/actuators/<name>/body_temperature`` of what a TCA lies in, if it is not bare: °C. An event
+  says when a TCA gets hotter than what its law was measured at, or colder again.
 * ``/heaters/<name>/{voltage,temperature}`` of the shape-memory spines, if there are any: V, °C.
 * ``/reward/<term>`` and ``/events``.
 """

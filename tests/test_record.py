@@ -17,6 +17,7 @@ from rerun.chunk import RrdReader
 
 from tca_mj import film as film_module
 from tca_mj import plots, render
+from tca_mj.modules.bending import bending_module
 from tca_mj.record import QUANTITIES, Recorder
 from tca_mj.robots.tetrapod import tetrapod
 from tca_mj.shapes import body_paths
@@ -210,6 +211,29 @@ def test_the_heaters_of_spines_are_recorded(tmp_path: Path, simulation: Chain) -
     with Recorder(simulation, tmp_path / "b.rrd") as recorder:
         recorder.frame()
     assert not any(path.startswith("/heaters") for path in read(recorder.path))
+
+
+def test_what_a_tca_lies_in_and_when_it_is_too_hot_is_recorded(tmp_path: Path) -> None:
+    sim = Simulation(bending_module(), timestep=5e-3)
+    powers = ([1.0, 0.0, 0.0], [4.5, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 0.0])
+    bodies, beyond = [sim.body_temperature.copy()], []
+    with Recorder(sim, tmp_path / "a.rrd") as recorder:
+        recorder.frame()
+        for power in powers:
+            sim.step(power, 1.0)
+            recorder.frame()
+            bodies.append(sim.body_temperature.copy())
+            beyond.append(bool(sim.extrapolated[0]))
+    back = read(recorder.path)
+    for i, name in enumerate(sim.tca_names):
+        values = back[f"/actuators/{name}/body_temperature"]["Scalars:scalars"]
+        np.testing.assert_array_equal([v[0] for v in values if v], np.array(bodies)[:, i])
+    assert bodies[-1][0] > 30.0
+    assert beyond == [False, True, False, False]  # 4.5 W for a second: beyond 160 °C
+    told = [v[0] for v in back["/events"]["TextLog:text"] if v]
+    assert told == [f"tca0: {how} the measured temperatures" for how in ("beyond", "within")]
+    assert [round(t, 6) for t in back["/events"]["sim_time"]] == [2.0, 3.0]
+    assert rrd("verify", recorder.path).returncode == 0
 
 
 def test_geometry_is_written_once_and_only_what_moves_has_poses(

@@ -14,8 +14,8 @@ from tca_mj.model.tendon import route_passes, route_tca
 from tca_mj.modules.bending import BendingSpec, bending_module
 from tca_mj.modules.finger import finger_pair
 from tca_mj.routes import Helix, leg_length
-from tca_mj.sim import Simulation, SimulationDiverged
-from tca_mj.tca import CATALOGUE, FibreSpec, step_temperature
+from tca_mj.sim import Simulation, SimulationDiverged, SimulationOverheated
+from tca_mj.tca import CATALOGUE, FibreSpec, HeatStep
 from tca_mj.tca.calibration import _calibrated
 
 
@@ -63,11 +63,14 @@ def test_time_goes_on_by_the_duration():
 
 
 def test_temperature_is_that_of_the_closed_form():
-    """Twenty updates are as exact as one."""
+    """Twenty updates are as exact as one, of TCAs and of what they lie in."""
     sim, power = simulation(), np.array([0.5, 0.0, 1.5])
     sim.step(power, 0.4)
-    once = step_temperature(np.full(3, 25.0), power, sim.bank.heat, 0.4)
+    cold = np.full(3, 25.0)
+    once, warm, _ = HeatStep.of(sim.bank.heat, 0.4).advance(cold, cold, power)
     assert sim.temperature == pytest.approx(once, rel=1e-12)
+    assert sim.body_temperature == pytest.approx(warm, rel=1e-12)
+    assert sim.embedded.all() and 25.0 < warm[0] < once[0]
 
 
 def test_energy_is_the_integral_of_the_power_and_is_not_lost():
@@ -290,12 +293,32 @@ def test_divergence_is_reported(value, tmp_path, monkeypatch):
         sim.step(np.zeros(3), 0.1)
 
 
-@pytest.mark.parametrize("power", [200.0, 1e5])
-def test_a_tca_that_is_far_too_hot_is_a_divergence(power):
-    """200 W each: 3500 °C in a second, no modulus of the fibre; 100 kW: at once."""
+@pytest.mark.parametrize("power", [5.0, 200.0, 1e5])
+def test_a_tca_above_the_melting_point_is_refused_by_name(power):
+    """From 260 °C on there is no fibre: within seconds, within 0.1 s, at once."""
     sim = simulation()
+    with pytest.raises(SimulationOverheated, match=r"tca1 would have \d+ °C: .* melts at 260"):
+        sim.step([0.0, power, 0.0], 10.0)
+    assert (sim.temperature <= 260.0).all()
+
+
+def test_a_tca_beyond_its_measurements_is_flagged():
+    sim = simulation()
+    sim.step([0.0, 2.0, 0.0], 1.0)
+    assert not sim.extrapolated.any()
+    sim.step(sim.keep([25.0, 161.0, 159.0]), 0.02)
+    assert sim.extrapolated.tolist() == [False, True, False]
+
+
+def test_a_law_that_has_no_state_is_a_divergence():
+    """A fibre that softens to nothing at 200 °C, below its melting point."""
+    part = bending_module()
+    fibre = replace(part.tcas[0].spec.fibre, softening=3.9e9 / 175.0,
+                    load_softening=(0.0, 0.0, 1.0))  # fmt: skip
+    part.tcas = tuple(replace(t, spec=replace(t.spec, fibre=fibre)) for t in part.tcas)
+    sim = Simulation(part, law="rod")
     with pytest.raises(SimulationDiverged, match="the TCAs have no state at .* s: "):
-        sim.step([power] * 3, 1.0)
+        sim.step([3.0, 0.0, 0.0], 10.0)
 
 
 @pytest.mark.parametrize("stretch", [-0.8, 5.0])

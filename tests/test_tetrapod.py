@@ -238,9 +238,10 @@ def test_tcas_and_spines_put_no_net_force_on_the_robot():
         mujoco.mj_forward(model, data)
         mujoco.mj_subtreeVel(model, data)
         fastest = max(fastest, float(np.abs(data.qvel[6:]).max()))
-        assert data.subtree_com[0] == pytest.approx(start, abs=1e-7)
+        assert data.subtree_com[0] == pytest.approx(start, abs=1e-6 * SPEC.rail_length)
         # A thousandth of what one leg of 1.3 g has that is moved at 2 mm/s, 0.1 m off the middle.
-        assert np.abs(data.subtree_linvel[0]).max() < 1e-7
+        leg = 1e-3 * 1.3e-3 * 2e-3 / model.body_subtreemass[0]
+        assert np.abs(data.subtree_linvel[0]).max() < leg
         assert np.abs(data.subtree_angmom[0]).max() < 2.6e-10
     assert fastest > 0.03 and sim.tension.max() > 0.2
 
@@ -437,7 +438,7 @@ def test_a_leg_carries_its_share_of_the_weight(still):
 @pytest.mark.parametrize(
     ("field", "value"),
     [
-        ("tca_capacity", 0.0), ("module_mass", -1.0), ("spacing", math.nan),
+        ("module_mass", -1.0), ("spacing", math.nan),
         ("memory_angle", 3.5), ("memory_angle", math.nan), ("rail_length", math.inf),
         ("rail_width", 0.0), ("rail_mass", 0.0), ("leg_station", -1e-3),
         ("leg_height", 0.0), ("belly_friction", 0.0), ("nodes", 0), ("nodes", 2.5),

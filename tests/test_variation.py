@@ -8,7 +8,9 @@ import pytest
 
 from tca_mj.assets import mjcf
 from tca_mj.envs.stance import Stance, tetrapod_scene
+from tca_mj.modules.bending import bending_module
 from tca_mj.robots.tetrapod import TetrapodSpec
+from tca_mj.sim import Simulation
 from tca_mj.variation import Nominal, Variation
 
 SPEC = TetrapodSpec()
@@ -130,6 +132,19 @@ def test_a_tca_in_steady_state_is_warmer_by_what_it_does_not_lose(sim, nominal):
     for _ in range(200):
         state, _ = sim.bank.advance(state, power, length, 0.5)
     assert state.temperature[:12] == pytest.approx(10.0 + 0.2 / (0.5 * loss), rel=1e-3)
+
+
+def test_what_lies_in_silicone_varies_with_it():
+    """All three conductances to the air are scaled, capacities are not."""
+    module = Simulation(bending_module())
+    before = module.bank.heat
+    Nominal(module).apply(Variation(heat_loss=0.5, ambient=10.0))
+    after = module.bank.heat
+    for name, factor in (("conductance", 0.5), ("body_loss", 0.5), ("capacity", 1.0),
+                         ("body_capacity", 1.0)):  # fmt: skip
+        np.testing.assert_array_equal(getattr(after, name), factor * getattr(before, name))
+    module.reset()
+    assert (module.temperature == 10.0).all() and (module.body_temperature == 10.0).all()
 
 
 def test_draws_are_scaled_by_the_spread():
