@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 from tca_mj.model.part import Part
 from tca_mj.rod import RodShape, StrandLaw
 from tca_mj.sim import Simulation
-from tca_mj.tca import TcaSpec, step_temperature
+from tca_mj.tca import HeatStep, TcaSpec
 
 BLUE, ORANGE, GREEN, PURPLE, GREY = "#0072b2", "#d55e00", "#009e73", "#8a4fa3", "#666666"
 MUJOCO = dict(ls="none", marker="o", ms=6, mfc="white", mew=1.6)  # markers of every figure
@@ -94,8 +94,10 @@ def passive_law(temperature: float = 25.0) -> StrandLaw:
 
 
 def heated(tca: TcaSpec, power: ArrayLike, time: float = 2.0) -> NDArray[np.float64]:
-    """Temperature after some time at constant power from cold [°C]."""
-    return step_temperature(tca.ambient, power, tca.heat, time)
+    """Temperature of a TCA, in its body if it has one, after some time at constant power [°C]."""
+    cold = np.full(np.shape(power), tca.ambient)
+    temperature, _, _ = HeatStep.of(tca.heat, time).advance(cold, cold, np.asarray(power))
+    return temperature
 
 
 def bend(shape: RodShape) -> float:

@@ -27,7 +27,7 @@ SPEC = ArmSpec()
 OBJECT = 1e-3  # mass of an object between the finger tips: an estimate [kg]
 GRAVITY = (0.0, 0.0, 9.81)  # the arm hangs along +z
 # Temperatures of TCA 1, of TCAs 2 and 3, and of the wrist's [°C]: TCA 1 is kept taut.
-CASES = [(25, 25, 25), (50, 90, 60), (70, 115, 70), (80, 135, 80), (90, 150, 90), (100, 160, 100)]
+CASES = [(25, 25, 25), (50, 90, 60), (70, 115, 70), (85, 135, 80), (100, 150, 90), (110, 160, 100)]
 
 
 def loads() -> list[list[tuple[float, float]]]:

