@@ -13,9 +13,16 @@ from tca_mj.modules.morphing import MorphingSpec
 from tca_mj.smp.lumped import LumpedModule
 from tca_mj.tca.sensing import DisplacementFit, fit_displacement
 
-# Gains of the angle's controller, tuned on the hanging module: the gain keeps away from the 2 Hz
-# at which the soft module swings, the integral follows what the hot TCA loses in 3 s.
-GAINS = PiSpec(proportional=40.0, integral=15.0, highest=MorphModule.max_power)
+# Gains of the angle's controller, tuned on the module, hanging and weightless. Far away a large
+# gain and little integral, or it would overshoot; within 10°, for good, a gain that keeps away from
+# the 2 Hz at which the soft module swings, and an integral that follows the tube as it warms.
+GAINS = PiSpec(
+    proportional=40.0, integral=5.0, near=math.radians(10.0), near_proportional=12.0,
+    near_integral=20.0, highest=MorphModule.max_power,
+)  # fmt: skip
+# Over the fading time that the tube is said to have: a power that falls too fast relaxes the TCA by
+# some tenths of a degree, one that falls too slowly damages it. Estimate: tubes are known to 20 %.
+FADING = 1.3
 
 
 def calibrate(spec: MorphingSpec, largest: float = math.radians(260.0)) -> DisplacementFit:
@@ -27,11 +34,16 @@ def calibrate(spec: MorphingSpec, largest: float = math.radians(260.0)) -> Displ
         spec: The module.
         largest: Largest angle of the fit [rad].
     """
-    module = LumpedModule(spec.spine, spec.heater, spec.sheathed)
+    module = _lumped(spec)
     angles, cold = np.linspace(0.0, largest, 27), module.bank.rest()
     lengths = [module.tca_length(np.full(1, angle)) for angle in angles]
     ohms = [float(module.bank.resistance(cold, length)[0]) for length in lengths]
     return fit_displacement(ohms, angles)
+
+
+def _lumped(spec: MorphingSpec) -> LumpedModule:
+    """The same module with one angle."""
+    return LumpedModule(spec.spine, spec.heater, spec.sheathed)
 
 
 @dataclass(slots=True)
@@ -56,7 +68,10 @@ class MorphPolicy:
 
     def __post_init__(self) -> None:
         self._fit = calibrate(self.module_spec)
-        self.sequence = MorphSequence(drive=ClosedLoop(pi=self.gains, angle_of=self.angle_of))
+        self.sequence = MorphSequence(
+            drive=ClosedLoop(pi=self.gains, angle_of=self.angle_of),
+            fading_time=FADING * _lumped(self.module_spec).fading_time,
+        )
 
     def angle_of(self, resistance: float) -> float:
         """Angle [rad] that a resistance [ohm] tells."""

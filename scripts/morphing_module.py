@@ -8,13 +8,13 @@ Without a way to OpenGL only the tables can be had.
 import argparse
 import math
 import time
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import imageio.v3 as imageio
 import mujoco
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
@@ -27,9 +27,10 @@ from tca_mj.sim import Simulation
 from tca_mj.smp.lumped import LumpedModule
 
 G, WEIGHT = 9.81, 15e-3  # Sun, Fig. 6.1: 15 g at the tip
-BLUE, ORANGE, GREY = "#0072b2", "#d55e00", "#666666"
+BLUE, ORANGE, GREEN, GREY = "#0072b2", "#d55e00", "#009e73", "#666666"
 SHADE = {Phase.SOFTEN: "#fbe3d0", Phase.MORPH: "#f7efe2", Phase.HOLD: "#e8f1e4",
          Phase.HARDEN: "#dfeaf5", Phase.RELEASE: "#f2f2f2"}  # fmt: skip
+BETWEEN = (Phase.DONE, Phase.SOFTEN)
 DOWN = {"to its own side": (0, -1, 0), "to the other side": (0, 1, 0), "across": (1, 0, 0),
         "along the base": (0, 0, 1), "against the base": (0, 0, -1)}  # fmt: skip
 
@@ -78,8 +79,7 @@ class Bench:
 
 def play(bench: Bench, target: float | None, dt: float = 0.1) -> list[dict[str, Any]]:
     """One sequence; a row for every step."""
-    policy, sim, rows = MorphPolicy(bench.spec), bench.sim, []
-    sequence = replace(policy.sequence, release_time=25.0)
+    sequence, sim, rows = MorphPolicy(bench.spec).sequence, bench.sim, []
     progress = sequence.start(target)
     while not progress.over:
         seen = Measurement(float(sim.spines.temperature[0]), float(sim.resistance[0]))
@@ -87,7 +87,8 @@ def play(bench: Bench, target: float | None, dt: float = 0.1) -> list[dict[str, 
         sim.step([command.tca_power], dt, voltage=command.heater_voltage, fan=command.fan)
         rows.append(dict(time=sim.time, phase=progress.phase, command=command, angle=bench.angle,
                          spine=float(sim.spines.temperature[0]), tca=float(sim.temperature[0]),
-                         tension=float(sim.tension[0])))  # fmt: skip
+                         tube=float(sim.body_temperature[0]),
+                         ohm=float(sim.resistance[0])))  # fmt: skip
     return rows
 
 
@@ -118,11 +119,14 @@ def lumped_table() -> str:
     bench = Bench(gravity=(0, 0, 0), period=0.025)
     lumped = LumpedModule(bench.spec.spine, bench.spec.heater, bench.spec.sheathed)
     state, moments = lumped.rest(), (10.0, 15.0, 25.0, 30.0, 40.0, 60.0)
+    heat = lumped.bank.heat
     lines = ["| time | spine | MuJoCo | one angle | |", "|---" * 5 + "|"]
     for k in range(600):
         now = 0.1 * k
         volts = 25.0 if now < 6.95 else 9.5 if now < 24.95 else 0.0
-        watts, fan = (4.0 if 7.45 < now < 34.95 else 0.0), now > 24.95
+        wanted = np.full(1, min(130.0, 25.0 + 10.0 * (now - 7.5)))
+        watts = float(heat.keeping(wanted, state.tca.body)[0]) if 7.45 < now < 34.95 else 0.0
+        fan = now > 24.95
         bench.sim.step([watts], 0.1, voltage=volts, fan=fan)
         for _ in range(4):
             state = lumped.step(state, volts, watts, fan, 0.025)
@@ -138,12 +142,12 @@ def node_table() -> str:
     """Soft, bent and under its weight: tip and angle over the number of nodes, in Markdown."""
     lines = ["| nodes | angle | tip off | angle | tip off |", "|---" * 5 + "|"]
     counts, found = (5, 10, 20, 40), []
-    for power in (3.4, 5.8):
+    for temperature in (107.0, 165.0):
         row = []
         for nodes in counts:
             bench = Bench(gravity=(0, 0, G), motions=("bend_x",), nodes=nodes)
             bench.soften()
-            bench.sim.step([power], 80.0, voltage=9.5)
+            bench.sim.step(bench.sim.keep([temperature]), 60.0, voltage=9.5)
             row.append((bench.angle, bench.sim.data.xpos[bench.tip].copy()))
         found.append(row)
     for i, nodes in enumerate(counts):
@@ -181,9 +185,8 @@ def speed_table() -> str:
         morph = [r for r in rows if r["phase"] in (Phase.MORPH, Phase.HOLD)]
         late = [r["time"] for r in morph if abs(r["angle"] - 180.0) > 3.0]
         closed = max(late) - morph[0]["time"] + 0.2
-        power = [r["command"].tca_power for r in rows if r["phase"] is Phase.HARDEN][-1]
-        bench.sim.reset()
-        opened = at_voltage(bench, math.sqrt(power * float(bench.sim.resistance[0])), None)
+        _, power = bench.sim.bank.steady([morph[-1]["tca"]])
+        opened = at_voltage(bench, math.sqrt(float(power[0]) * morph[-1]["ohm"]), None)
         cells[1].append(f"{closed:.1f} s")
         cells[2].append(f"{opened:.0f} s, {opened / closed:.0f} times as long")
     names = (("240° at 25 V, soft", "1 s"), ("180° by closed loop", "within 3 s"),
@@ -217,37 +220,58 @@ def policy_table(seeds: int = 10) -> str:
     return "\n".join([f"{sum(rows)} of {seeds}", "", *lines])
 
 
+def shown(rows: list[dict[str, Any]]) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Two spans of time [s]: each of two sequences until 25 s after its spine is rigid."""
+    pairs = zip(rows, rows[1:], strict=False)
+    again = next(b["time"] for a, b in pairs if (a["phase"], b["phase"]) == BETWEEN)
+    rigid = [r["time"] for r in rows if r["phase"] is Phase.HARDEN]
+    first = max(time for time in rigid if time < again)
+    return (0.0, first + 25.0), (again - 5.0, rigid[-1] + 25.0)
+
+
+def shade(axis: Axes, rows: list[dict[str, Any]], span: tuple[float, float], top: float) -> None:
+    """Colours the phases, and names them at a height if there is one."""
+    inside = [r for r in rows if span[0] <= r["time"] <= span[1]]
+    start = 0
+    for i in range(1, len(inside) + 1):
+        if i == len(inside) or inside[i]["phase"] is not inside[start]["phase"]:
+            phase = inside[start]["phase"]
+            ends = inside[start]["time"], inside[i - 1]["time"]
+            axis.axvspan(*ends, color=SHADE.get(phase, "white"), lw=0)
+            if top and ends[1] - ends[0] > 5.5:
+                axis.text(sum(ends) / 2.0, top, str(phase), ha="center", fontsize=8)
+            start = i
+
+
 def draw_course(path: Path) -> None:
     """Angle, temperatures and powers over a sequence to 150° and one back."""
     bench = Bench(gravity=(0, 0, G), motions=("bend_x",))
     rows = [*play(bench, math.radians(150.0)), *play(bench, None)]
+    at, spans = np.array([r["time"] for r in rows]), shown(rows)
+    volts = [r["command"].heater_voltage for r in rows]
+    heater = [float(bench.spec.heater.power(volt)) for volt in volts]
     figure = Figure(figsize=(8.0, 7.6), layout="constrained")
-    axes, at = figure.subplots(4, 1, sharex=True), np.array([r["time"] for r in rows])
-    start = 0
-    for i in range(1, len(rows) + 1):
-        if i == len(rows) or rows[i]["phase"] is not rows[start]["phase"]:
-            phase, ends = rows[start]["phase"], (at[start], at[i - 1])
-            for axis in axes:
-                axis.axvspan(*ends, color=SHADE.get(phase, "white"), lw=0)
-            if ends[1] - ends[0] > 4.0:
-                axes[0].text(sum(ends) / 2.0, 174.0, str(phase), ha="center", fontsize=8)
-            start = i
-    axes[0].plot(at, [r["angle"] for r in rows], color=BLUE, lw=2)
-    axes[0].plot([0.0, at[-1]], [150.0, 150.0], "--", color=GREY, lw=0.8)
-    axes[0].set(ylabel="angle [°]", ylim=(-10, 195))
-    axes[1].plot(at, [r["spine"] for r in rows], color=ORANGE, lw=2, label="spine")
-    axes[1].plot(at, [r["tca"] for r in rows], color=BLUE, lw=2, label="TCA")
-    axes[1].set(ylabel="temperature [°C]", ylim=(20, 165))
-    axes[2].plot(at, [r["command"].heater_voltage for r in rows], color=ORANGE, lw=2,
-                 label="heater")  # fmt: skip
-    axes[2].set(ylabel="voltage [V]", ylim=(-1, 29))
-    heater = [float(bench.spec.heater.power(r["command"].heater_voltage)) for r in rows]
-    axes[3].plot(at, heater, color=ORANGE, lw=2, label="heater")
-    axes[3].plot(at, [r["command"].tca_power for r in rows], color=BLUE, lw=2, label="TCA")
-    axes[3].set(ylabel="power [W]", xlabel="time [s]", xlim=(0.0, at[-1]))
-    for axis in axes[1:]:
-        axis.legend(loc="upper right", frameon=False, ncols=2)
-    for axis in axes:
+    axes = figure.subplots(4, 2, sharex="col", sharey="row",
+                           width_ratios=[b - a for a, b in spans])  # fmt: skip
+    for column, span in zip(axes.T, spans, strict=True):
+        for axis in column:
+            shade(axis, rows, span, 174.0 if axis is column[0] else 0.0)
+        column[0].plot(at, [r["angle"] for r in rows], color=BLUE, lw=2)
+        column[0].plot([0.0, at[-1]], [150.0, 150.0], "--", color=GREY, lw=0.8)
+        column[1].plot(at, [r["spine"] for r in rows], color=ORANGE, lw=2, label="spine")
+        column[1].plot(at, [r["tca"] for r in rows], color=BLUE, lw=2, label="TCA")
+        column[1].plot(at, [r["tube"] for r in rows], "--", color=GREEN, lw=2, label="tube")
+        column[2].plot(at, volts, color=ORANGE, lw=2, label="heater")
+        column[3].plot(at, heater, color=ORANGE, lw=2, label="heater")
+        column[3].plot(at, [r["command"].tca_power for r in rows], color=BLUE, lw=2, label="TCA")
+        column[3].set(xlabel="time [s]", xlim=span)
+    axes[0, 0].set(ylabel="angle [°]", ylim=(-10, 195))
+    axes[1, 0].set(ylabel="temperature [°C]", ylim=(20, 165))
+    axes[2, 0].set(ylabel="voltage [V]", ylim=(-1, 29))
+    axes[3, 0].set(ylabel="power [W]")
+    for axis in axes[1:, 1]:
+        axis.legend(loc="upper right", frameon=False)
+    for axis in axes.flat:
         axis.grid(color="#e6e6e6")
         axis.set_axisbelow(True)
         axis.spines[["top", "right"]].set_visible(False)
@@ -284,8 +308,7 @@ def draw_shapes(path: Path) -> None:
         angles.append(bench.angle)
 
     shoot()
-    policy, progress = MorphPolicy(spec), None
-    sequence = policy.sequence
+    sequence = MorphPolicy(spec).sequence
     progress = sequence.start(math.radians(135.0))
     taken = False
     while not progress.over:

@@ -6,26 +6,28 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from tca_mj.control.morph import ClosedLoop, Measurement, MorphSequence, Phase
 from tca_mj.control.pi import PiSpec
 from tca_mj.smp import HeaterSpec, SmpSpec, SpineSpec, SpineState, advance, recovery, spring
 from tca_mj.smp.heater import COOL_TIME, FAN_COOL_TIME, HOLD_TEMPERATURE
-from tca_mj.smp.lumped import LumpedModule, ModuleState, sheathed
-from tca_mj.tca import CATALOGUE
+from tca_mj.smp.lumped import LumpedModule, ModuleState, in_tube
+from tca_mj.tca import CATALOGUE, TcaSpec
 from tca_mj.tca.sensing import fit_displacement
 
-SMP, SPINE = SmpSpec(), SpineSpec()
+SMP, SPINE, TCA = SmpSpec(), SpineSpec(), CATALOGUE["free-stroke"]
 HEATER = HeaterSpec.fitted(SPINE)
-TUBE = 0.12  # heat capacity of what of the tube is heated with the TCA, an estimate [J/K]
 BLUE, ORANGE, GREEN, GREY = "#0072b2", "#d55e00", "#009e73", "#666666"
 SHADE = {Phase.SOFTEN: "#fbe3d0", Phase.MORPH: "#f7efe2", Phase.HOLD: "#e8f1e4",
          Phase.HARDEN: "#dfeaf5", Phase.RELEASE: "#f2f2f2"}  # fmt: skip
+BETWEEN = (Phase.DONE, Phase.SOFTEN)
 
 
-def module(tube: float = TUBE) -> LumpedModule:
-    return LumpedModule(SPINE, HEATER, sheathed(CATALOGUE["free-stroke"], SPINE, tube))
+def module(tca: TcaSpec | None = None) -> LumpedModule:
+    """With a kind of TCA, by default the one that lies loosely in its tube."""
+    return LumpedModule(SPINE, HEATER, (tca or in_tube(TCA)).of_length(2.0 * SPINE.length))
 
 
 def closed_loop(body: LumpedModule) -> MorphSequence:
@@ -33,9 +35,9 @@ def closed_loop(body: LumpedModule) -> MorphSequence:
     angles, cold = np.radians(np.linspace(0.0, 260.0, 27)), body.bank.rest()
     ohms = [body.bank.resistance(cold, body.tca_length(np.full(1, a)))[0] for a in angles]
     fit = fit_displacement(ohms, angles)
-    pi = PiSpec(proportional=60.0, integral=30.0, highest=40.0)
+    pi = PiSpec(proportional=25.0, integral=25.0, highest=40.0)
     drive = ClosedLoop(pi=pi, angle_of=lambda ohm: float(fit.displacement(ohm)))
-    return MorphSequence(drive=drive, release_time=25.0)
+    return MorphSequence(drive=drive, fading_time=body.fading_time)
 
 
 def play(
@@ -52,7 +54,8 @@ def play(
             rows.append(dict(time=dt * (len(rows) + 1), phase=progress.phase, command=command,
                              angle=math.degrees(state.angle[0]), tension=float(state.tension[0]),
                              spine=float(state.heater.temperature[0]),
-                             tca=float(state.tca.temperature[0]), state=state))  # fmt: skip
+                             tca=float(state.tca.temperature[0]),
+                             tube=float(state.tca.body[0]), state=state))  # fmt: skip
     return rows
 
 
@@ -100,19 +103,22 @@ def heat_tables() -> tuple[str, str]:
 
 
 def speed_table() -> str:
-    """How fast the module is, for three ways to count its tube, in Markdown."""
-    lines = ["| heat capacity of the tube | 240° at 25 V | 180° by closed loop |"
-                " 180° by constant voltage |", "|---" * 4 + "|"]  # fmt: skip
-    for tube in (0.0, TUBE, 0.81):
-        body = module(tube)
+    """How fast the module is, for three ways in which its TCA can lie, in Markdown."""
+    ways = {"loosely in the tube": in_tube(TCA), "touching it all round": in_tube(TCA, 1.0),
+            "bare": TCA}  # fmt: skip
+    lines = ["| TCA | 240° at 25 V | 180° by closed loop | 180° by constant voltage |",
+                "|---" * 4 + "|"]  # fmt: skip
+    for name, tca in ways.items():
+        body = module(tca)
         rows = play(body, (math.pi,), 0.1)
         morph = [r for r in rows if r["phase"] in (Phase.MORPH, Phase.HOLD)]
         late = [r["time"] for r in morph if abs(r["angle"] - 180.0) > 3.0]
         closed = max(late) - morph[0]["time"] + 0.2
-        last = [r for r in rows if r["phase"] is Phase.HARDEN][-1]
-        volts = math.sqrt(last["command"].tca_power * body.resistance(last["state"]))
+        last = [r for r in rows if r["phase"] is Phase.HARDEN][-1]["state"]
+        _, power = body.bank.steady(last.tca.temperature)
+        volts = math.sqrt(float(power[0]) * body.resistance(last))
         lines.append(
-            f"| {tube:.2f} J/K | {time_at_voltage(body, 25.0, 240.0, 0.02):.1f} s |"
+            f"| {name} | {time_at_voltage(body, 25.0, 240.0, 0.02):.1f} s |"
             f" {closed:.1f} s | {time_at_voltage(body, volts, None, 0.1):.0f} s |"
         )
     return "\n".join(lines)
@@ -183,30 +189,52 @@ def draw_fixing(figure: Figure) -> None:
     axis.legend(loc="center left", frameon=False)
 
 
-def draw_morph(figure: Figure) -> None:
-    rows = play(module(), (math.pi, None))
-    axes = figure.subplots(3, 1, sharex=True)
-    time = np.array([r["time"] for r in rows])
+def shown(rows: list[dict[str, Any]]) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Two spans of time [s]: each of two sequences until 25 s after its spine is rigid."""
+    pairs = zip(rows, rows[1:], strict=False)
+    again = next(b["time"] for a, b in pairs if (a["phase"], b["phase"]) == BETWEEN)
+    rigid = [r["time"] for r in rows if r["phase"] is Phase.HARDEN]
+    first = max(time for time in rigid if time < again)
+    return (0.0, first + 25.0), (again - 5.0, rigid[-1] + 25.0)
+
+
+def shade(axis: Axes, rows: list[dict[str, Any]], span: tuple[float, float], height: float) -> None:
+    """Colours the phases, and names them at a height if there is one."""
+    inside = [r for r in rows if span[0] <= r["time"] <= span[1]]
     start = 0
-    for i in range(1, len(rows) + 1):
-        if i == len(rows) or rows[i]["phase"] is not rows[start]["phase"]:
-            phase, ends = rows[start]["phase"], (time[start], time[i - 1])
-            for axis in axes:
-                axis.axvspan(*ends, color=SHADE.get(phase, "white"), lw=0)
-            if ends[1] - ends[0] > 4.0:
-                axes[0].text(sum(ends) / 2.0, 192.0, str(phase), ha="center", fontsize=8)
+    for i in range(1, len(inside) + 1):
+        if i == len(inside) or inside[i]["phase"] is not inside[start]["phase"]:
+            phase = inside[start]["phase"]
+            ends = inside[start]["time"], inside[i - 1]["time"]
+            axis.axvspan(*ends, color=SHADE.get(phase, "white"), lw=0)
+            if height and ends[1] - ends[0] > 5.5:
+                axis.text(sum(ends) / 2.0, height, str(phase), ha="center", fontsize=8)
             start = i
-    axes[0].plot(time, [r["angle"] for r in rows], color=BLUE, lw=2)
-    axes[0].set(ylabel="angle [°]", ylim=(-10, 215))
-    axes[1].plot(time, [r["spine"] for r in rows], color=ORANGE, lw=2, label="spine")
-    axes[1].plot(time, [r["tca"] for r in rows], color=BLUE, lw=2, label="TCA")
-    axes[1].set(ylabel="temperature [°C]", ylim=(20, 150))
+
+
+def draw_morph(figure: Figure) -> None:
+    """Both sequences; the time in which the TCA only cools is left out between them."""
+    rows = play(module(), (math.pi, None))
+    time, spans = np.array([r["time"] for r in rows]), shown(rows)
+    axes = figure.subplots(3, 2, sharex="col", sharey="row",
+                           width_ratios=[b - a for a, b in spans])  # fmt: skip
     heater = [float(HEATER.power(r["command"].heater_voltage)) for r in rows]
-    axes[2].plot(time, heater, color=ORANGE, lw=2, label="heater")
-    axes[2].plot(time, [r["command"].tca_power for r in rows], color=BLUE, lw=2, label="TCA")
-    axes[2].set(ylabel="power [W]", xlabel="time [s]", xlim=(0.0, time[-1]))
-    for axis in axes[1:]:
-        axis.legend(loc="upper right", frameon=False, ncols=2)
+    for column, span in zip(axes.T, spans, strict=True):
+        for axis in column:
+            shade(axis, rows, span, 192.0 if axis is column[0] else 0.0)
+        column[0].plot(time, [r["angle"] for r in rows], color=BLUE, lw=2)
+        column[1].plot(time, [r["spine"] for r in rows], color=ORANGE, lw=2, label="spine")
+        column[1].plot(time, [r["tca"] for r in rows], color=BLUE, lw=2, label="TCA")
+        column[1].plot(time, [r["tube"] for r in rows], "--", color=GREEN, lw=2, label="tube")
+        column[2].plot(time, heater, color=ORANGE, lw=2, label="heater")
+        column[2].plot(time, [r["command"].tca_power for r in rows], color=BLUE, lw=2,
+                       label="TCA")  # fmt: skip
+        column[2].set(xlabel="time [s]", xlim=span)
+    axes[0, 0].set(ylabel="angle [°]", ylim=(-10, 215))
+    axes[1, 0].set(ylabel="temperature [°C]", ylim=(20, 150))
+    axes[2, 0].set(ylabel="power [W]")
+    for axis in axes[1:, 1]:
+        axis.legend(loc="upper right", frameon=False)
 
 
 def main() -> None:

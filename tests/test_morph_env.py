@@ -7,6 +7,7 @@ import subprocess
 import sys
 import warnings
 from copy import copy
+from dataclasses import replace
 from pathlib import Path
 
 import gymnasium as gym
@@ -21,6 +22,7 @@ from tca_mj.agents.morph import MorphPolicy
 from tca_mj.control.morph import Phase
 from tca_mj.envs.morph import ACTION, OBSERVATION, MorphModule
 from tca_mj.render import RenderingUnavailable
+from tca_mj.smp import lumped
 
 ID = "TCA/MorphModule-v0"
 OFF = np.array([-1.0, -1.0, -1.0], dtype=np.float32)
@@ -332,6 +334,27 @@ def test_the_script_reaches_and_fixes_the_angle(shared, seed):
     assert info["angle"] == pytest.approx(last["angle"], abs=math.radians(1.0))
     assert info["energy"] == pytest.approx(last["energy"])
     assert policy.progress.phase is Phase.RELEASE
+
+
+@pytest.mark.parametrize(
+    ("name", "factor"), [("capacity", 1.2), ("capacity", 0.8), ("conductance", 0.8)]
+)
+def test_a_tube_that_is_known_to_20_percent_damages_nothing(monkeypatch, name, factor):
+    """The script believes in the tube that is specified; the module has another one."""
+    nominal = lumped.in_tube
+
+    def other(tca, touching=0.0):
+        tca = nominal(tca, touching)
+        return replace(tca, body=replace(tca.body, **{name: factor * getattr(tca.body, name)}))
+
+    monkeypatch.setattr(lumped, "in_tube", other)
+    env = MorphModule()
+    monkeypatch.setattr(lumped, "in_tube", nominal)
+    believed = MorphPolicy().module_spec.sheathed.body
+    real = env.sim.bank.specs[0].body
+    assert getattr(real, name) == pytest.approx(factor * getattr(believed, name))
+    _, infos, _ = episode(env, 4)
+    assert infos[-1]["success"] and not infos[-1]["damaged"]
 
 
 def test_the_goal_asks_for_rest(shared):

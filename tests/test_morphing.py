@@ -60,23 +60,24 @@ class Bench:
         self.sim.step([0.0], 7.0, voltage=25.0)
         return self
 
-    def heat(self, watts, seconds=60.0):
-        """Soft, with a TCA at constant power until it is steady."""
-        self.sim.step([watts], seconds, voltage=9.5)
+    def heat(self, temperature, seconds=20.0):
+        """Soft, with a TCA that has been at a temperature for long, until nothing moves."""
+        self.power = self.sim.keep([temperature])
+        self.sim.step(self.power, seconds, voltage=9.5)
         assert np.abs(self.sim.data.qvel).max() < 1e-3
         return self
 
 
 def play(bench, target, dt=0.1):
-    """The sequence by the TCA's own resistance; time, phase, angle and TCA's power by step."""
-    sequence = replace(MorphPolicy(bench.spec).sequence, release_time=25.0)
+    """The sequence by the TCA's own resistance; time, phase, angle, TCA's temperature by step."""
+    sequence = MorphPolicy(bench.spec).sequence
     sim, rows = bench.sim, []
     progress = sequence.start(target)
     while not progress.over:
         seen = Measurement(float(sim.spines.temperature[0]), float(sim.resistance[0]))
         progress, command = sequence.step(progress, seen, dt)
         sim.step([command.tca_power], dt, voltage=command.heater_voltage, fan=command.fan)
-        rows.append((sim.time, progress.phase, bench.degrees, command.tca_power))
+        rows.append((sim.time, progress.phase, bench.degrees, float(sim.temperature[0])))
     assert progress.phase is Phase.DONE
     assert not sim.spines.damaged.any()
     return rows
@@ -84,8 +85,8 @@ def play(bench, target, dt=0.1):
 
 @cache
 def bent():
-    """Soft without gravity, the TCA at constant power."""
-    return Bench().soften().heat(3.5, 40.0)
+    """Soft without gravity, the TCA at 110 °C."""
+    return Bench().soften().heat(110.0, 40.0)
 
 
 def test_the_torques_are_in_balance():
@@ -118,15 +119,19 @@ def test_without_gravity_it_does_what_the_module_with_one_angle_does():
     bench = Bench(period=0.05)
     lumped = LumpedModule(SPINE, SPEC.heater, SPEC.sheathed)
     state = lumped.rest()
+    heat = lumped.bank.heat
     for k in range(400):
         volts = 25.0 if k < 70 else 9.5 if k < 180 else 0.0
-        watts, fan = (4.0 if 75 <= k < 290 else 0.0), k >= 180
+        wanted = np.full(1, min(130.0, 25.0 + k - 75.0))  # by 10 K/s to 130 °C, and kept there
+        watts = float(heat.keeping(wanted, state.tca.body)[0]) if 75 <= k < 290 else 0.0
+        fan = k >= 180
         bench.sim.step([watts], 0.1, voltage=volts, fan=fan)
         for _ in range(2):
             state = lumped.step(state, volts, watts, fan, 0.05)
         assert bench.degrees == pytest.approx(math.degrees(state.angle[0]), abs=0.3)
         assert bench.sim.spines.temperature == pytest.approx(state.heater.temperature)
         assert bench.sim.temperature == pytest.approx(state.tca.temperature)
+        assert bench.sim.body_temperature == pytest.approx(state.tca.body)
         assert bench.sim.tension == pytest.approx(state.tension, abs=3e-4)
     assert bench.degrees > 100.0
     assert bench.degrees == pytest.approx(math.degrees(state.angle[0]), rel=2.5e-3)
@@ -182,7 +187,7 @@ def test_the_nodes_converge_at_second_order():
     """Soft, bent, hanging: halving the cells quarters the error; the default is off by 0.6 %."""
     tips = []
     for nodes in (5, 10, 20):
-        bench = Bench(replace(PLANE, nodes=nodes), (0, 0, 1)).soften().heat(5.8)
+        bench = Bench(replace(PLANE, nodes=nodes), (0, 0, 1)).soften().heat(165.0)
         tips.append(bench.sim.data.xpos[bench.tip].copy())
     assert bench.degrees > 140.0
     first, second = (np.linalg.norm(a - b) for a, b in zip(tips, tips[1:], strict=False))
@@ -192,15 +197,15 @@ def test_the_nodes_converge_at_second_order():
 
 def test_it_stays_in_its_plane():
     """A sideways kick dies out in the strongly bent, soft, hanging module."""
-    plane = Bench(PLANE, (0, 0, 1)).soften().heat(5.8)
-    space = Bench(SPEC, (0, 0, 1)).soften().heat(5.8)
+    plane = Bench(PLANE, (0, 0, 1)).soften().heat(165.0)
+    space = Bench(SPEC, (0, 0, 1)).soften().heat(165.0)
     tip = plane.sim.data.xpos[plane.tip]
     assert space.sim.data.xpos[space.tip] == pytest.approx(tip, abs=1e-6)
     space.sim.data.qvel[space.sim.model.joint("spine.bend_y0").dofadr[0]] = 3.0
-    space.sim.step([5.8], 0.3, voltage=9.5)
+    space.sim.step(space.power, 0.3, voltage=9.5)
     assert abs(space.sim.data.xpos[space.tip, 0]) > 1e-4
-    space.sim.step([5.8], 12.0, voltage=9.5)
-    plane.sim.step([5.8], 12.3, voltage=9.5)
+    space.sim.step(space.power, 12.0, voltage=9.5)
+    plane.sim.step(plane.power, 12.3, voltage=9.5)
     tip = plane.sim.data.xpos[plane.tip]
     assert space.sim.data.xpos[space.tip] == pytest.approx(tip, abs=1e-5)
 
@@ -241,7 +246,7 @@ def voltage_for(temperature):
 
 
 def test_240_degrees_take_about_a_second_at_25_volts():
-    """Sun, Section 6.2.1: 1 s; how much of the tube is heated is an estimate."""
+    """Sun, Section 6.2.1: 1 s, within a factor of two; nothing about the tube is fitted to it."""
     bench = Bench(period=0.05).soften()
     start = bench.sim.time
     while bench.degrees < 240.0:
@@ -251,21 +256,23 @@ def test_240_degrees_take_about_a_second_at_25_volts():
 
 @pytest.mark.parametrize("down", [(0, 0, 0), (0, 0, 1)], ids=["weightless", "hanging"])
 def test_the_closed_loop_is_quick_and_the_open_loop_slow(down):
-    """Sun, Section 6.2.2: within 3 s, and 100 times slower without feedback; here over 10."""
+    """Sun, Section 6.2.2: within 3 s, and over 100 times slower without feedback; here over 50."""
     bench = Bench(down=down)
     rows = play(bench, math.pi)
     begin = next(time for time, phase, _, _ in rows if phase is Phase.MORPH)
-    late = [t for t, p, angle, _ in rows if p in (Phase.MORPH, Phase.HOLD) and angle < 177.0]
+    active = (Phase.MORPH, Phase.HOLD)
+    late = [t for t, p, angle, _ in rows if p in active and abs(angle - 180.0) > 3.0]
     quick = max(late) - begin + 0.1
     assert quick < 3.0
-    power = next(power for _, phase, _, power in reversed(rows) if phase is Phase.HARDEN)
+    hot = next(hot for _, phase, _, hot in reversed(rows) if phase is Phase.HOLD)
+    _, power = bench.sim.bank.steady([hot])
     bench.sim.reset()
     bench.soften()
     angles = [bench.degrees]
     while len(angles) < 41 or angles[-1] - angles[-41] > 3.0:  # 3° in 20 s is steady
-        bench.sim.step([power], 0.5, voltage=9.5)
+        bench.sim.step(power, 0.5, voltage=9.5)
         angles.append(bench.degrees)
-    assert 0.5 * (len(angles) - 41) > 10.0 * quick
+    assert 0.5 * (len(angles) - 41) > 50.0 * quick
     assert angles[-1] == pytest.approx(180.0, abs=8.0)
 
 

@@ -119,9 +119,10 @@ class MorphState:
         phase: Phase.
         target: Angle to reach [rad]; None to recover the memorised shape without the TCA.
         elapsed: Time in this phase [s].
-        steady: Time for which the angle has been within its tolerance, in this phase [s].
+        steady: Time for which the angle has been within its tolerance, at the goal [s].
         boost: Whether the heater gets its full voltage to stay hot.
-        power: Recent mean power of the TCA at the goal, kept while hardening [W].
+        power: Recent mean power of the TCA at the goal [W].
+        earlier: Recent mean of that mean, by which one sees how the power falls [W].
         control: State of the PI controller.
         fault: What was wrong, empty if nothing was.
     """
@@ -132,6 +133,7 @@ class MorphState:
     steady: float = 0.0
     boost: bool = False
     power: float = 0.0
+    earlier: float = 0.0
     control: PiState = field(default_factory=pi_rest)
     fault: str = ""
 
@@ -156,9 +158,14 @@ class MorphSequence:
         highest_temperature: Above it something is wrong with the heater [°C]. An estimate.
         hold_time: Time at the goal before hardening [s]. Sun, Section 6.1.3: held for 10 s.
         average_time: Time over which the power at the goal is averaged, for the power while the
-            spine hardens: longer than noise, shorter than ``hold_time``, so that what it took to
-            get there is forgotten [s]. An estimate.
-        release_time: Time that the TCA is given to cool [s]. An estimate.
+            spine hardens: longer than noise, much shorter than ``hold_time``, so that what it
+            took to get there is forgotten [s]. An estimate.
+        fading_time: Time constant with which the power falls that keeps a TCA at one temperature,
+            as the tube round it warms (``LumpedModule.fading_time``); 0 for a bare TCA, whose
+            power stays. In a tube, power that stayed would heat it on, against a stiff spine. A
+            longer time than the true one relaxes the TCA, a shorter one contracts it [s].
+        release_time: Time that the TCA is given to cool, so that it does not pull when the spine is
+            softened next: nearly four times the 48 s in which its tube cools [s]. An estimate.
         fan: Whether the fan helps to harden.
         soften_limit: Longest time to soften [s]. About twice what 25 V need: a thermistor that
             has come off must not let them heat the spine for long.
@@ -178,8 +185,9 @@ class MorphSequence:
     margin: float = 6.0
     highest_temperature: float = 160.0
     hold_time: float = 10.0
-    average_time: float = 2.0
-    release_time: float = 60.0
+    average_time: float = 1.5
+    fading_time: float = 0.0
+    release_time: float = 180.0
     fan: bool = True
     soften_limit: float = 15.0
     morph_limit: float = 60.0
@@ -209,6 +217,8 @@ class MorphSequence:
                 f"highest_temperature = {self.highest_temperature} must be above soft_temperature"
                 f" + margin = {hot}"
             )
+        if not 0.0 <= self.fading_time < math.inf:
+            raise ValueError(f"fading_time = {self.fading_time} must be finite and 0 or more")
         if not self.hold_limit > self.hold_time:
             raise ValueError(
                 f"hold_limit = {self.hold_limit} must be above hold_time = {self.hold_time}"
@@ -302,7 +312,7 @@ class MorphSequence:
             if state.phase is Phase.HOLD and state.steady >= self.hold_time - _ROUNDING:
                 return replace(state, phase=Phase.HARDEN, elapsed=0.0)
             if state.phase is Phase.MORPH and self._arrived(state, measured):
-                return replace(state, phase=Phase.HOLD, elapsed=0.0, steady=0.0, power=0.0)
+                return replace(state, phase=Phase.HOLD, elapsed=0.0, steady=0.0)
         elif temperature <= self.rigid_temperature:
             return MorphState(Phase.RELEASE, state.target)
         return state
@@ -336,22 +346,38 @@ class MorphSequence:
         if state.target is None:
             power = 0.0
         elif hardening and measured.spine_temperature < self.soft_temperature:
-            return state, state.power
+            return self._faded(state, dt)
         elif isinstance(self.drive, OpenLoop):
             power = self.drive.voltage**2 / measured.resistance
         else:
             error = state.target - self.drive.angle_of(measured.resistance)
             control, output = pi_step(self.drive.pi, state.control, error, dt)
             state, power = replace(state, control=control), float(output)
-        if state.phase is Phase.HOLD:
-            if not self._arrived(state, measured):
-                state = replace(state, steady=0.0, power=0.0)
-            else:
-                time = state.steady + dt
-                weight = min(1.0, dt / min(time, self.average_time))
-                mean = state.power + (power - state.power) * weight
-                state = replace(state, steady=time, power=mean)
+        if hardening or state.phase is Phase.HOLD:
+            if not (hardening or self._arrived(state, measured)):
+                return replace(state, steady=0.0), power
+            time = state.steady + dt
+            weight = min(1.0, dt / min(time, self.average_time))
+            mean = state.power + (power - state.power) * weight
+            earlier = state.earlier + (mean - state.earlier) * weight
+            state = replace(state, steady=time, power=mean, earlier=earlier)
         return state, power
+
+    def _faded(self, state: MorphState, dt: float) -> tuple[MorphState, float]:
+        """Power that keeps the TCA's temperature now, and the means ``dt`` later.
+
+        It is settled + falling exp(-t/fading_time). In a mean over the past, what falls is larger
+        by a known ``gain``, in the mean of that mean by its square: the two means tell both terms.
+        The power never rises, so that an error can relax a TCA but not contract it.
+        """
+        share = dt / self.average_time
+        if self.fading_time <= self.average_time or share >= 1.0:
+            return state, state.power  # what falls so fast is over by now
+        gain = share / (1.0 - (1.0 - share) * math.exp(dt / self.fading_time))
+        falling = max(0.0, state.earlier - state.power) / (gain - 1.0)
+        settled, left = state.power - falling, math.exp(-dt / self.fading_time) * falling
+        later = replace(state, power=settled + left, earlier=settled + gain * left)
+        return later, max(0.0, settled + left / gain)
 
 
 def _positive(**values: float) -> None:

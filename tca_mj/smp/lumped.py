@@ -27,11 +27,18 @@ class ModuleSolveError(ArithmeticError):
     """The balance of the module's torques was not found."""
 
 
-def in_tube(tca: TcaSpec) -> TcaSpec:
-    """A TCA that lies loosely in its silicone tube, as Sun, Section 6.1.1, makes it."""
+def in_tube(tca: TcaSpec, touching: float = 0.0) -> TcaSpec:
+    """A TCA in its silicone tube.
+
+    Args:
+        tca: The kind of TCA.
+        touching: Share of its circumference that touches the tube, 0 to 1. Estimate: it lies
+            loosely there, as it shrinks into the tube in its training (Sun, Section 6.1.1).
+    """
     radius = 0.5 * TUBE_DIAMETER
     body = silicone_body(
-        tca, section=math.pi * (radius**2 - tca.outer_radius**2), perimeter=2.0 * math.pi * radius,
+        tca, section=math.pi * (radius**2 - tca.outer_radius**2),
+        perimeter=2.0 * math.pi * radius, touching=touching,
     )  # fmt: skip
     return replace(tca, body=body)
 
@@ -89,6 +96,14 @@ class LumpedModule:
         self.heater = heater
         self.bank = TcaBank([tca])
         self.damage = damage or DamageSpec.of(spine.smp)
+
+    @property
+    def fading_time(self) -> float:
+        """C_b/(G + λ_b), in which a TCA that is kept hot warms its tube; 0 if it is bare [s]."""
+        heat = self.bank.heat
+        if not self.bank.embedded[0]:
+            return 0.0
+        return float(np.squeeze(heat.body_capacity / (heat.conductance + heat.body_loss)))
 
     def rest(self, memory: float = 0.0) -> ModuleState:
         """Cold and unloaded, in the memorised shape [rad]."""
