@@ -131,17 +131,18 @@ def test_overheating_is_reported():
 
 
 def test_resistance_of_the_measured_tca():
-    """Sun, Table 2.3 and Section 2.3.1: 6.7 ohm/dm; 0.55 ohm less at 50 % strain on 110 mm."""
+    """Sun, Table 2.3 and Section 2.3.1: 6.7 ohm/dm made; 0.55 ohm less at 50 % strain on 110 mm."""
     spec = CATALOGUE["type-2-180"].of_length(0.110)
     bank = TcaBank([spec])
     rest = bank.resistance(bank.rest(), np.array([0.110]))
     stretched = bank.resistance(bank.rest(), np.array([0.165]))
     contracted = bank.resistance(bank.rest(), np.array([0.080]))
-    assert rest[0] == pytest.approx(7.37, rel=1e-12)
-    assert rest[0] - stretched[0] == pytest.approx(0.55, rel=1e-12)
+    made = 67.0 * 0.1335 * 110.0 / 109.0  # 109 mm in Table 2.1, 110 mm in Table 2.3
+    assert rest[0] == pytest.approx(made, rel=1e-12)
+    assert rest[0] - stretched[0] == pytest.approx(0.55 * 110.0 / 109.0, rel=1e-12)
     assert contracted[0] > rest[0]
     power = bank.power_at(bank.rest(), np.array([0.110]), np.array([12.0]))
-    assert power[0] == pytest.approx(144.0 / 7.37, rel=1e-12)
+    assert power[0] == pytest.approx(144.0 / made, rel=1e-12)
 
 
 def test_length_is_read_back_from_the_resistance():

@@ -162,11 +162,11 @@ def test_the_equilibrium_is_where_the_rod_carries_the_load():
         assert length == pytest.approx(theory, abs=1e-12)
 
 
-@pytest.mark.parametrize("name, power", [("free-stroke", 1.2), ("type-0-180", 2.4)])
+@pytest.mark.parametrize("name, power", [("free-stroke", 1.2), ("type-0-180", 6.0)])
 def test_at_constant_power_a_damped_weight_comes_to_rest_in_the_static_solution(name, power):
     """Type 0 runs into the contact of its turns on the way."""
     tcas = LoadedTcas([CATALOGUE[name]], Load.weight(5e-3, 0.2))
-    course = tcas.simulate(tcas.rest(), Heating(value=power), 0.1, 500)
+    course = tcas.simulate(tcas.rest(), Heating(value=power), 0.05, 1000)
     settled = 25.0 + power / tcas.heat.loss
     np.testing.assert_allclose(course.temperature[-1], settled, rtol=1e-6)
     np.testing.assert_allclose(course.length[-1], tcas.settle(settled), atol=1e-7)
@@ -187,7 +187,11 @@ def test_steps_of_any_length_are_stable(dt):
 
 @pytest.mark.parametrize("mass, volts", [(0.03, 5.0), (0.03, 6.0), (0.05, 5.0), (0.05, 6.0)])
 def test_inertia_hardly_matters(mass, volts):
-    """Sun, Section 3.4.4, case 3; 6.7 ohm/dm of *fibre*, or 5 V would melt it. Below 0.1 mm."""
+    """Sun, Section 3.4.4, case 3; 6.7 ohm/dm of *fibre*, or 5 V would melt it. Below 0.15 mm.
+
+    An equilibrium that sets off with speed v leaves the weight behind it by v/w at most, and swings
+    it by that; w is the frequency of weight and coil. 10 % for what is not linear.
+    """
     def ohms(length, _):
         return 67.0 * 0.175 * (1.0 - 0.149 * (length / TCA.rest_length - 1.0))
 
@@ -195,7 +199,11 @@ def test_inertia_hardly_matters(mass, volts):
     heating = Heating(source="voltage", value=volts)
     moving = tcas.simulate(tcas.rest(), heating, 5e-3, 200)
     still = tcas.simulate(tcas.rest(), heating, 5e-3, 200, "quasistatic")
-    assert np.abs(moving.length - still.length).max() < 0.1e-3
+    speed = np.abs(np.diff(still.length[:, 0])).max() / 5e-3
+    stiffness = float(CoilRods([TCA]).tension(tcas.rest().length, np.array([25.0]))[1][0])
+    behind = np.abs(moving.length - still.length).max()
+    assert behind < 1.1 * speed / np.sqrt(stiffness / mass)
+    assert behind < 0.15e-3
     assert np.ptp(still.length) > 1e-3
 
 

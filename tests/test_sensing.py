@@ -16,10 +16,12 @@ from tca_mj.tca.sensing import (
 )
 from tca_mj.tca.sensor import CurrentSensor, measured, moving_average, pulse_mean, pulse_power
 
-# Sun, Table 2.3: natural length 110 mm, 6.7 ohm/dm.
+# Sun, Table 2.3: natural length 110 mm, 6.7 ohm/dm made: 133.5 mm for 109 mm (Table 2.1).
 TCA = CATALOGUE["type-2-180"].of_length(0.110)
 WIRE = WireTable.of([TCA])
 NO_LOAD = SensingSpec(load=0.0)
+OHMS = 67.0 * 0.1335 * 110.0 / 109.0
+SLOPE = 0.20 / 0.357 * OHMS / 0.110  # about 20 % over the free stroke of 35.7 % [ohm/m]
 
 
 def stretched(load):
@@ -27,14 +29,33 @@ def stretched(load):
 
 
 def test_resistance_rises_with_contraction_by_what_is_published():
-    """0.55 ohm for 50 % of 110 mm (Sun, Section 2.3.1)."""
-    ohms = resistance_displacement(WIRE, np.array([[0.0], [0.055]]), sensing=NO_LOAD)
-    assert ohms[0, 0] == pytest.approx(7.37, rel=1e-12)
-    assert ohms[1, 0] - ohms[0, 0] == pytest.approx(0.55, rel=1e-12)
+    """About 20 % over the free stroke of 35.7 % (Sun, Section 3.1.1 and Table 2.1)."""
+    ohms = resistance_displacement(WIRE, np.array([[0.0], [0.357 * 0.110]]), sensing=NO_LOAD)
+    assert ohms[0, 0] == pytest.approx(OHMS, rel=1e-12)
+    assert ohms[1, 0] == pytest.approx(1.2 * OHMS, rel=1e-12)
+
+
+def test_a_cold_pull_changes_it_by_what_is_published():
+    """0.55 ohm for 50 % of a TCA of 109 mm (Sun, Section 2.3.1), and the kink at its length."""
+    tca = CATALOGUE["type-2-180"]
+    wire = WireTable.of([tca])
+    at = tca.rest_length * np.array([[1.0], [1.5], [0.9]])
+    rest, pulled, short = resistance(wire, at, 25.0)[:, 0]
+    assert rest - pulled == pytest.approx(0.55, rel=1e-12)
+    assert wire.contraction[0] > 4.0 * wire.stretch[0] > 0.0
+    assert short - rest == pytest.approx(0.1 * 0.20 / 0.357 * rest, rel=1e-12)
+
+
+def test_the_load_term_is_the_elastic_stretch():
+    """A load stretches the cold TCA; its resistance falls by the cold slope. To 5 %."""
+    for load in (0.05, 0.1):
+        pulled = resistance_force(WIRE, [[load]], stretched)[0, 0]
+        heated = resistance_displacement(WIRE, [[0.0]], load)[0, 0]
+        assert OHMS - heated == pytest.approx(OHMS - pulled, rel=0.05)
 
 
 def test_without_a_load_it_is_the_law_of_the_length():
-    length = np.linspace(0.05, 0.15, 11)[:, None]
+    length = np.linspace(0.05, 0.11, 11)[:, None]
     np.testing.assert_allclose(
         resistance_length(WIRE, length, TCA.rest_length), resistance(WIRE, length, 25.0), rtol=1e-14
     )
@@ -49,9 +70,8 @@ def test_curves_over_displacement_nearly_overlap_and_those_over_length_do_not():
     loads = 9.81e-3 * np.array([10.0, 20.0, 30.0, 40.0, 50.0])
     displacement = np.linspace(0.0, 0.04, 21)[:, None]
     curves = resistance_displacement(WIRE, displacement, loads)
-    slope = 0.55 / 0.055  # [ohm/m]
-    off = (curves - curves.mean(axis=1, keepdims=True)) / slope
-    assert np.abs(off).max() == pytest.approx(0.2 * 0.040, rel=0.05)
+    off = (curves - curves.mean(axis=1, keepdims=True)) / SLOPE
+    assert 0.0 < np.abs(off).max() < 0.2 * 0.040
     assert np.all(loads < SensingSpec().valid_share * TCA.breaking_force)
     starts = stretched(loads[:, None])[:, 0]
     length = 0.12
@@ -79,7 +99,7 @@ def test_the_curve_does_not_depend_on_the_speed():
 def test_a_load_on_a_cold_tca_lowers_its_resistance():
     loads = np.linspace(0.0, 0.4, 9)[:, None]
     ohms = resistance_force(WIRE, loads, stretched)
-    assert ohms[0, 0] == pytest.approx(7.37, rel=1e-9)
+    assert ohms[0, 0] == pytest.approx(OHMS, rel=1e-9)
     assert np.all(np.diff(ohms[:, 0]) < 0.0)
     np.testing.assert_allclose(sensed_length(WIRE, ohms), stretched(loads), rtol=1e-12)
 
@@ -89,10 +109,10 @@ def test_terms_of_load_and_temperature():
     base = resistance_displacement(WIRE, [0.02], sensing=sensing)
     np.testing.assert_array_equal(base, resistance_displacement(WIRE, [0.02]))
     np.testing.assert_allclose(
-        resistance_displacement(WIRE, [0.02], 0.5, sensing=sensing), base - 0.05 * 7.37
+        resistance_displacement(WIRE, [0.02], 0.5, sensing=sensing), base - 0.05 * OHMS
     )
     np.testing.assert_allclose(
-        resistance_displacement(WIRE, [0.02], 0.0, 125.0, sensing), base + 0.1 * 7.37
+        resistance_displacement(WIRE, [0.02], 0.0, 125.0, sensing), base + 0.1 * OHMS
     )
 
 
@@ -121,7 +141,7 @@ def test_the_error_of_the_fit_is_that_of_the_noise():
         rmses.append(fit.rmse)
     sensor = CurrentSensor()
     sigma_current = math.hypot(sensor.noise, sensor.resolution / math.sqrt(12.0))
-    theory = np.mean(true**2) / 12.0 * sigma_current / (0.55 / 0.055)
+    theory = np.mean(true**2) / 12.0 * sigma_current / SLOPE
     assert np.mean(rmses) == pytest.approx(theory, rel=0.05)
     assert np.mean(rmses) == pytest.approx(0.2184e-3, rel=0.1)
 

@@ -11,7 +11,8 @@ Three curves of it are measured there, and two of them disagree with one R(lengt
 of a cold TCA falls as a load stretches it (R-F). But hot TCAs start contracting from different
 loaded lengths, after a heating cycle in which they crept, and their resistances over the
 displacement from there nearly overlap (R-D): what a load stretches for good hardly counts. So
-``resistance_displacement`` counts from the loaded start, and knows the load by a small term.
+``resistance_displacement`` counts from the loaded start, and of the load it knows the elastic
+stretch.
 
 A sensor measures the mean current under a pulsed voltage, with noise and steps (``measured``),
 and a polynomial of third order reads the displacement from it (``fit_displacement``).
@@ -118,9 +119,9 @@ class SensingSpec:
     """What little load and temperature do to the resistance of a TCA that contracts.
 
     Attributes:
-        load: Relative fall per load, fitted to the largest that Sun, Section 2.3.2, leaves: the
-            curve averaged over 10 to 50 g misleads by less than 20 % of a step of 40 mm; 20 g
-            off the mean are 8 mm then, 0.08 ohm of 7.37 ohm [1/N].
+        load: Relative fall per load. It follows from the cold slope: the load stretches the TCA
+            of Sun, Table 2.3, by F/(14.0 N/m) of its 110 mm and lowers the resistance by 0.123
+            times that, while what it has crept does not count [1/N].
         temperature: Relative rise per kelvin at one displacement and load. None is published,
             as temperature and displacement rose together: the curve over the displacement
             contains it [1/K].
@@ -128,7 +129,7 @@ class SensingSpec:
         valid_share: Share of the breaking force up to which load hardly counts, Sun, Section 2.3.1.
     """
 
-    load: float = 0.055
+    load: float = 0.123 / (14.0 * 0.110)
     temperature: float = 0.0
     reference_temperature: float = 25.0
     valid_share: float = 0.7

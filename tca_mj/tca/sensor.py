@@ -26,7 +26,7 @@ class CurrentSensor:
 
     resolution: float = 0.8e-3
     gain_error: float = 0.0
-    noise: float = 0.42e-3
+    noise: float = 1.3e-3
     pulse_frequency: float = 4e3
 
     def __post_init__(self) -> None:

@@ -1,9 +1,9 @@
 """What a twisted-and-coiled actuator (TCA) is made of, and the TCAs that have been published.
 
 "Sun" below is J. Sun's dissertation, Colorado State University; its Chapter 2 and its
-Chapter 3 describe threads of the same kind that differ in radius and inserted twist, so
-they are two fibres here. What was weighed, their mass per length, is a number of its own and does
-not follow from the radius, which is the one that the moduli were fitted with.
+Chapter 3 twist the same thread under the same weight, so that one fibre is behind both, but for
+the inserted twist and the mass per length, which are printed twice. What was weighed is a number of
+its own and does not follow from the radius, which is the one that the moduli were fitted with.
 """
 
 import math
@@ -342,23 +342,38 @@ def heat_of(specs: Sequence[TcaSpec]) -> HeatSpec:
     return HeatSpec(**columns)
 
 
-# Sun, Section 2.1.1 and Table 2.1: thread of 0.34 mm diameter with 287 turns on 350 mm. The
-# moduli and the expansion are those of Chapter 3. The influence of the load is left out: it was
-# fitted to a fibre of 0.21 mm, and this one reaches the end of that fit, 171 rad/m, at 0.31 N.
-# Five TCAs weigh 0.16 g, one 0.03 g: 32 mg on 350 mm, as weighed. (350 mm of the thread before it
-# is twisted would be 33 mg, 350 mm after it, as the lengths of Table 2.1 need, 41 mg.)
-_THREAD_2 = FibreSpec(
-    radius=0.17e-3, inserted_twist=2.0 * math.pi * 287.0 / 0.350, line_density=32e-6 / 0.350
-)
 # Sun, Table 3.1 (radius 0.21 mm, 4.71 rad/mm).
 _THREAD_3 = FibreSpec(load_softening=(3.24e-4, -0.027, 1.0))
+# Sun, Section 2.1.1 and Table 2.1: the same thread, twisted under the same 240 g, with 287 turns on
+# 350 mm. Stiffnesses, softening and expansion are therefore those measured in Chapter 3, on the
+# circle that they were measured with: what is 0.34 mm thick here is a thickness. With the moduli of
+# Chapter 3 on a circle of 0.34 mm, EI and GJ would be 2.3 times too small, and the published pull,
+# temporary length and loaded stroke of these TCAs are missed (``tca_mj.validation.threads``).
+# Five TCAs weigh 0.16 g, one 0.03 g: 32 mg on 350 mm, as weighed. (350 mm of the thread before it
+# is twisted would be 33 mg, 350 mm after it, as the lengths of Table 2.1 need, 41 mg.)
+_THREAD_2 = replace(
+    _THREAD_3, inserted_twist=2.0 * math.pi * 287.0 / 0.350, line_density=32e-6 / 0.350
+)
+
+
+# All TCAs of Chapter 2 have the resistance of the same thread (Sun, Section 2.2.2). Table 2.3 has
+# 6.7 ohm/dm and does not say of what. "Around 80 mA" at 0.8 V (Section 2.3.1) are 10 ohm and chose
+# the made length, 8.9 ohm (89 mA); the natural one would be 7.4 ohm, the thread 23 ohm [ohm].
+_THREAD_OHMS = 67.0 * 0.1335
+# Heat that these TCAs lose, per length of thread: fitted to the largest displacement, 60 mm after
+# 1 A for 2 s under 20 g (Section 2.2.2). 56 mW/K of 350 mm lie between the 32 and 64 mW/K that an
+# infrared camera gives (1 to 2 °C at those 64 mW). They are twice what was identified in Chapter 3
+# (``TcaSpec.heat_loss``), and more than still air takes: ``tca_mj.validation.heat`` has the table
+# of both [W/(m K)].
+_AIR_LOSS = 0.0555 / 0.350
 
 
 def _type(natural: float, contact: float = 0.350 * math.sin(math.radians(11.53))) -> TcaSpec:
     """Sun, Table 2.1: 350 mm of thread; the lengths are taken, the natural pitch follows.
 
     The coil radius is that of the outer diameter, (1.08 - 0.34)/2 mm, and agrees with mandrel and
-    thread, (0.405 + 0.34)/2 mm. The coils touch at the made length of type 0: 11.53°, 70 mm.
+    thread, (0.405 + 0.34)/2 mm. Coils that were made in a groove touch at the made length of type
+    0: 11.53°, 70 mm. Resistance and loss are those of Chapter 2, see above.
     """
     return TcaSpec(
         fibre=_THREAD_2,
@@ -366,6 +381,9 @@ def _type(natural: float, contact: float = 0.350 * math.sin(math.radians(11.53))
         coil_radius=0.37e-3,
         pitch_angle=math.asin(natural / 0.350),
         minimum_pitch_angle=math.asin(contact / 0.350),
+        resistance_per_length=_THREAD_OHMS / natural,
+        stretch_resistance=0.55 / _THREAD_OHMS / 0.5,
+        heat_loss=_AIR_LOSS,
     )
 
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from tca_mj.plots import temperature_colour
 from tca_mj.tca import CATALOGUE, hanging_length, softening, untwist
 from tca_mj.tca.dynamics import Heating, Load, LoadedTcas
-from tca_mj.validation import lifting, sensors, strokes, theories
+from tca_mj.validation import drag, lifting, sensors, strokes, theories
 from tca_mj.validation.creeping import Experiment, four_lengths
 from tca_mj.validation.race import Race
 from tca_mj.validation.strokes import weight
@@ -88,8 +88,35 @@ def creep_figure(figure: Any, found: Experiment) -> None:
         if word in ("20 g", "heated", "unloaded"):
             axis.axvline(time, color="#999999", lw=1, ls=":")
             axis.text(time + 4, 63, word, fontsize=9, rotation=90, va="bottom")
-    axis.set(xlabel="time [s]", ylabel="length [mm]", ylim=(62, 152), xlim=(0, found.time[-1]))
+    axis.set(xlabel="time [s]", ylabel="length [mm]", ylim=(62, 130), xlim=(0, found.time[-1]))
     axis.set_title("type-1-180, ends glued: loaded, heated once, unloaded, heated again")
+
+
+def drag_figure(figure: Any) -> None:
+    """A weight dragged against friction, and five TCAs with a kettle; as Fig. 2.3c."""
+    left, right = figure.subplots(1, 2)
+    tca = CATALOGUE[drag.NAME]
+    pull, way = drag.pull_of(tca), np.linspace(0.0, 0.066, 67)
+    for hot, colour in zip((130.0, drag.DATA, drag.ANNEALED, 240.0), _COLOURS, strict=False):
+        force = [pull(tca.rest_length - x, hot) for x in way]
+        left.plot(1e3 * way, force, color=colour, lw=2, label=f"{hot:.0f} °C")
+    left.axhline(drag.FRICTION, color="#666666", lw=1, ls="--")
+    left.text(1.0, drag.FRICTION - 0.015, "friction", fontsize=8, va="top")
+    left.axvline(0.48e3 * tca.rest_length, color="#999999", lw=1, ls=":")
+    left.text(0.48e3 * tca.rest_length - 0.6, 0.02, "48 %", fontsize=8, ha="right")
+    left.set(xlabel="way [mm]", ylabel="pull [N]", xlim=(0, 66), ylim=(0, 0.9),
+             title=f"one {drag.NAME}")  # fmt: skip
+    left.legend(fontsize=8, frameon=False, loc="upper right")
+    one, five = (drag.study(240.0, count) for count in (1, drag.KETTLE[1]))
+    rising = one.temperature < 240.0
+    for run, style, word in ((one, "-", "one, 0.4 N, 0.4 kg"), (five, "--", "five, 2 N, 2 kg")):
+        colour = _BLUE if run is one else _ORANGE
+        right.plot(run.temperature[rising], 1e3 * run.moved[rising], style, color=colour, lw=2,
+                   label=word)  # fmt: skip
+    right.axvspan(_DATA_END, 240, color=_GREY, zorder=0)
+    right.set(xlabel="temperature [°C]", ylabel="way [mm]", xlim=(25, 240), ylim=(0, 66),
+              title="heated by 50 K/s; grey: beyond the data")  # fmt: skip
+    right.legend(fontsize=8, frameon=False, loc="upper left")
 
 
 def sensing_figure(figure: Any, curves: Mapping[int, sensors.Curve]) -> None:

@@ -8,19 +8,35 @@ from pathlib import Path
 from typing import Any
 
 from tca_mj.machine import machine, versions
-from tca_mj.validation import creeping, figures, lifting, race, sensors, strokes, theories
+from tca_mj.validation import (
+    creeping,
+    drag,
+    figures,
+    heat,
+    lifting,
+    modules,
+    race,
+    sensors,
+    strokes,
+    theories,
+    threads,
+)
 from tca_mj.validation.facts import Finding, reasons, table, tally
 
 # Heading, and figures with their captions, in the order of the report.
 _CHAPTERS = {
-    "Strokes (Chapter 2)": ("strokes", "creep"),
+    "Strokes (Chapter 2)": ("strokes", "creep", "drag"),
+    "Heat and resistance": (),
     "Sensing and control (Chapter 2)": ("sensing", "control"),
     "Models (Chapter 3)": ("fibre", "statics", "spring", "dynamics", "cone"),
+    "Modules and arm (Chapter 4)": (),
 }
 _CAPTIONS = {
     "strokes": "Displacement and length over temperature, ends free to spin; crosses: published."
     " Grey: beyond the data.",
     "creep": "A weight of 20 g on type 1-180: instant stretch, creep when hot, temporary length.",
+    "drag": "A weight dragged over a sheet, and a kettle by five TCAs. Left: pull over the way that"
+    " is done, at four temperatures, and the friction. Right: way over temperature.",
     "sensing": "Resistance of the TCA of Table 2.3 over length, displacement and force, and the"
     " third-order polynomial.",
     "control": "Step responses with self-sensing: integral and proportional gain, blown air,"
@@ -63,9 +79,10 @@ class Runs:
 
 
 def cheap_findings() -> list[Finding]:
-    """The findings that take about a second: no scans, control, cone or timing."""
-    return [*strokes.findings(full=False), *race.fastest(), *creeping.findings(),
-            *sensors.findings(), *theories.findings(full=False)]  # fmt: skip
+    """The findings that take some seconds: no scans, control, cone or timing."""
+    return [*strokes.findings(full=False), *drag.findings(), *race.fastest(),
+            *creeping.findings(), *heat.findings(), *sensors.findings(),
+            *theories.findings(full=False), *modules.findings(full=False)]  # fmt: skip
 
 
 def all_findings(runs: Runs) -> dict[str, list[Finding]]:
@@ -73,26 +90,34 @@ def all_findings(runs: Runs) -> dict[str, list[Finding]]:
     scans = strokes.scan_of_choices(), strokes.scan_of_factors()
     chapters = [
         [*strokes.free_strokes(), *strokes.contact_stops(), *strokes.loaded_contractions(*scans),
-         *strokes.loaded_stroke(), *strokes.overlap(), *race.fastest(runs.race),
-         *creeping.findings()],
+         *strokes.loaded_stroke(), *drag.findings(), *strokes.overlap(),
+         *race.fastest(runs.race), *creeping.findings()],
+        heat.findings(),
         [*sensors.findings(), *lifting.steps(runs.integral, runs.proportional, runs.blown),
          *lifting.demonstration(runs.answers[20], runs.answers[40]), *lifting.finger()],
         [*theories.moduli(), *theories.spread(), *theories.dynamics(runs.lifts),
          *theories.conical(runs.cone), *theories.speed()],
+        modules.findings(),
     ]  # fmt: skip
     return dict(zip(_CHAPTERS, chapters, strict=True))
 
 
+def all_tables() -> dict[str, str]:
+    """Tables of choices, as Markdown, by the chapter that they end."""
+    return dict(zip(_CHAPTERS, (threads.table(), heat.table()), strict=False))
+
+
 def validate_tca(out: Path | None = None) -> dict[str, Any]:
-    """Recomputes every published fact about TCAs, in about half a minute.
+    """Recomputes every published fact about TCAs, in about two minutes.
 
     Args:
         out: Folder for ``report.json``, ``report.md`` and the figures ``validation_*.png``; None to
             write nothing.
 
     Returns:
-        ``machine``, ``versions``, ``tally`` (number of findings by verdict) and ``chapters``: by
-        heading a list of findings as dictionaries, the fields of ``Finding``.
+        ``machine``, ``versions``, ``tally`` (number of findings by verdict), ``chapters``: by
+        heading a list of findings as dictionaries, the fields of ``Finding``, and ``tables``: by
+        heading a table of choices in Markdown.
 
     Raises:
         ImportError: If ``out`` is given and Matplotlib is not installed.
@@ -107,6 +132,7 @@ def validate_tca(out: Path | None = None) -> dict[str, Any]:
         "versions": versions(),
         "tally": tally(everything),
         "chapters": {name: [asdict(row) for row in rows] for name, rows in chapters.items()},
+        "tables": all_tables(),
     }
     if out is not None:
         out.mkdir(parents=True, exist_ok=True)
@@ -122,6 +148,7 @@ def draw_figures(runs: Runs, out: Path) -> None:
     fills: dict[str, tuple[float, float, Callable[[Any], None]]] = {
         "strokes": (9.5, 7.4, partial(figures.strokes_figure, race=runs.race)),
         "creep": (8.0, 3.8, partial(figures.creep_figure, found=creeping.experiment())),
+        "drag": (9.5, 3.8, figures.drag_figure),
         "sensing": (9.5, 7.0, partial(figures.sensing_figure, curves=sensors.curves())),
         "control": (11.5, 6.6, partial(
             figures.control_figure, integral=runs.integral, proportional=runs.proportional,
@@ -152,6 +179,8 @@ def report(result: dict[str, Any], pictures: str | None = None) -> str:
     for name, rows in result["chapters"].items():
         found = [Finding(**row) for row in rows]
         lines += [f"## {name}", "", table(found), "", reasons(found), ""]
+        if name in result["tables"]:
+            lines += [result["tables"][name], ""]
         for figure in _CHAPTERS[name] if pictures is not None else ():
             lines += [f"![{_CAPTIONS[figure]}]({pictures}validation_{figure}.png)", "",
                       f"*{_CAPTIONS[figure]}*", ""]  # fmt: skip

@@ -145,9 +145,11 @@ def _growth(
                         + ", ".join(f"{largest[theory.name, g]:.1f}" for g in weights)
                         for theory in (CST, LOVE)) + " %",
               with_load, strict=True,
-              reason="Love's coil is the shortest under any load, and under 50 and 100 g its"
-              " turns touch long before the rod's do: what is left of the distance is that stop."
-              " Castigliano grows. The contact angle of this TCA is an estimate (close packing)."),
+              reason="Castigliano grows. Under 50 g the turns of Love's coil and of the rod touch,"
+              " which shortens the rod's contraction that distances are divided by. The contact"
+              " angle of this TCA is an estimate, close packing at 0.42 mm; at the thickness of"
+              " 0.34 mm both would grow, but then it would contract by 31 % under 50 g, where 10"
+              " to 20 % are reported of self-coiled TCAs."),
         trend(STATICS, f"{name}, {weights[-1]} g: growth with heat", "errors grow",
               "both grow with every step of 5 °C",
               "; ".join(f"{theory.name} {values[middle]:.1f} to {values[-1]:.1f}"
@@ -245,7 +247,8 @@ def dynamics(found: dict[tuple[float, int], Lift] | None = None) -> list[Finding
         f"{shown} %", all(cst < love for cst, love in errors.values()),
         note="Largest distance of Castigliano and Love from the rod up to 160 °C; the 12 % refer"
         " to curves that are not available. 6.7 ohm/dm are counted per length of fibre here: per"
-        f" length of TCA 5 V would settle at {settles:.0f} °C, above the melting point. After 4 s"
+        f" length of TCA 5 V would settle at {settles:.0f} °C, above the melting point (see the"
+        " table of heat). After 4 s"
         f" at 6 V the TCA has {hottest:.0f} °C.",
     )]  # fmt: skip
 
