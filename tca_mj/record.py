@@ -302,9 +302,9 @@ class Recorder:
                 lines = rerun.components.LineStrip3DBatch(np.array(strips) if even else strips)
                 shades = rerun.components.ColorBatch(colours[j])
                 self._send(_line(name), times, (_STRIP, lines, ones), (_COLOUR, shades, ones))
-            for row, j in enumerate(self._embedded):
-                values = rerun.components.ScalarBatch(self._warmth[row, :k])
-                path = _curve(self.simulation.tca_names[j], BODY_QUANTITY)
+            for warmth, which in zip(self._warmth, self._embedded, strict=True):
+                values = rerun.components.ScalarBatch(warmth[:k])
+                path = _curve(self.simulation.tca_names[which], BODY_QUANTITY)
                 self._send(path, times, (_SCALAR, values, ones))
             for j, name in enumerate(self._heaters):
                 for row, quantity in enumerate(HEATER_QUANTITIES):

@@ -412,6 +412,23 @@ def test_a_leg_under_load_twists_as_theory_says():
     assert max(np.linalg.norm(found - exact), np.linalg.norm(twistless - exact)) < 5e-4
 
 
+def test_the_plates_of_a_mirrored_leg_are_the_mirror_image():
+    """Corners and the gaps beside them: what a side of the robot touches with."""
+    legs = [continuum_leg(mirrored=side).spec.compile() for side in (False, True)]
+    for i in range(legs[0].ngeom):
+        name = legs[0].geom(i).name
+        one, other = (model.geom(name) for model in legs)
+        assert other.pos == pytest.approx(one.pos * [1.0, -1.0, 1.0], abs=1e-15), name
+        ends = []
+        for geom in (one, other):
+            axis = np.empty(9)
+            mujoco.mju_quat2Mat(axis, geom.quat)
+            ends.append(axis.reshape(3, 3)[:, 2] * geom.size[1])
+        # A capsule has no front: its axis may point either way.
+        image = ends[0] * [1.0, -1.0, 1.0]
+        assert min(np.abs(ends[1] - image).max(), np.abs(ends[1] + image).max()) < 1e-12, name
+
+
 def test_a_mirrored_leg_is_the_mirror_image():
     tips = []
     for side in (False, True):

@@ -133,9 +133,9 @@ def continuum_leg(spec: LegSpec | None = None, *, mirrored: bool = False) -> Par
         mjspec.worldbody, spec.body, nodes=spec.nodes, name="rod", motions=spec.motions,
         rgba=(0.1, 0.1, 0.1, 0.0), collide=False,
     )  # fmt: skip
-    _dress(chain, spec)
-    _foot(chain, spec)
     turn = (-2.0 if mirrored else 2.0) * math.pi / spec.count
+    _dress(chain, spec, turn)
+    _foot(chain, spec)
     routes = [Helix(spec.offset, phase=spec.phase + turn * i) for i in range(spec.count)]
     tcas = tuple(
         route_tca(
@@ -157,8 +157,8 @@ def _touching(friction: float) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _dress(chain: Chain, spec: LegSpec) -> None:
-    """The rod that is seen, and a plate at the point of each piece."""
+def _dress(chain: Chain, spec: LegSpec, turn: float) -> None:
+    """The rod that is seen, and a plate at the point of each piece, from TCA to TCA by ``turn``."""
     for number, piece in enumerate(chain.pieces):
         middle = chain.local(number)
         whole = chain.piece * (0.5 if number in (0, spec.nodes) else 1.0)
@@ -168,7 +168,7 @@ def _dress(chain: Chain, spec: LegSpec) -> None:
             mass=0.0, rgba=[0.12, 0.12, 0.13, 1.0], contype=0, conaffinity=0,
         )  # fmt: skip
         for side in range(spec.count):  # a frame with the TCAs' holes in its corners
-            angles = [spec.phase + 2.0 * math.pi * (side + k) / spec.count for k in (0, 1)]
+            angles = [spec.phase + turn * (side + k) for k in (0, 1)]
             first, last = (
                 [spec.offset * math.cos(a), spec.offset * math.sin(a), middle] for a in angles
             )

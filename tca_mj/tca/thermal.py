@@ -87,8 +87,8 @@ class HeatSpec:
         """
         series = np.asarray(self.conductance + self.body_loss)
         rate = np.where(np.asarray(self.conductance) > 0.0, series / self.body_capacity, 0.0)
-        gap = self.steady_body(temperature) - floats("body", body)
-        return body - gap * np.expm1(-rate * dt)
+        now = floats("body", body)
+        return now - (self.steady_body(temperature) - now) * np.expm1(-rate * dt)
 
     def keeping(self, temperature: ArrayLike, body: ArrayLike) -> Array:
         """Power that keeps TCAs at ``temperature`` while the body has ``body``, (..., n) [W].
@@ -120,7 +120,7 @@ class BodyHeat:
     def __post_init__(self) -> None:
         for name in ("conductance", "capacity", "loss"):
             value = getattr(self, name)
-            if not (isinstance(value, Real) and 0.0 < value < math.inf):
+            if not (isinstance(value, Real) and 0.0 < float(value) < math.inf):
                 raise ValueError(f"{name} = {value!r} must be finite and above 0")
 
 
