@@ -24,8 +24,8 @@ class ReachPolicy:
         averaging: Time over which what is missed is integrated to as much again [s].
         near: How near the temperatures have to be to those aimed at for that: on the way there the
             tip misses the target for no fault of the model [K].
-        hottest: Temperature that no TCA is asked to pass [°C]. By 5 K below that from which on the
-            module may roll over, so that one that is weaker than nominal reaches its targets.
+        hottest: Temperature that no TCA is asked to pass [°C]. By 5 K above that of any target, so
+            that a module that is weaker than nominal reaches its targets, and below what costs.
     """
 
     module_spec: BendingSpec = field(default_factory=BendingSpec)

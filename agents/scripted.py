@@ -33,7 +33,7 @@ class PickAndPlaceGains:
         bend_now: Temperature asked for per offset of the gripper [K/m].
         brace: Rise of all three bending TCAs over the largest that the bend asks for. Pulling
             against each other they hold the soft body: strongly bent by one side alone it would
-            roll over, from about 140 °C on.
+            roll over, from about 130 °C on.
         wrist_slope: Rise of temperature that turns the wrist by one radian [K/rad].
         opening_slope: Rise of temperature that opens the gripper by one metre [K/m].
         clearance: Opening beyond the object's width [m].
@@ -43,13 +43,16 @@ class PickAndPlaceGains:
         over_cup: Offset of the object from the cup's axis at which it is let go [m].
         patience: Time after which half as much again is near enough: the arm cannot reach
             further without getting too hot [s].
+        turning_back: Time that the wrist is given to turn back [s]. Its silicone, warm by then,
+            keeps it turned for minutes; the cup is round.
         carry_height: Height of the object while it is carried [m].
         drop_height: Height of the object when it is let go [m].
         hover: Height above the object at which the gripper is aligned and opened [m].
         climb_rate: Velocity of the base over the missing height, without an object [1/s].
         carry_rate: The same with an object [1/s].
         calm: Time without a change of the opening after which the fingers hold [s].
-        cool: Temperature of the gripper at which they do in any case [°C].
+        cool: Temperature of the gripper's TCA over its silicone's at which they do in any case, as
+            the silicone keeps the TCA warm for minutes [K].
         slipped: Depth of the object below the finger tips at which it counts as lost [m].
         phase_limit: Time after which any phase is given up for the next one [s].
     """
@@ -61,20 +64,21 @@ class PickAndPlaceGains:
     bend_now: float = 1500.0
     brace: float = 0.55
     wrist_slope: float = 45.0
-    opening_slope: float = 5000.0
-    clearance: float = 8e-3
+    opening_slope: float = 1e4
+    clearance: float = 5.5e-3
     grasp_depth: float = 0.2
     aligned: float = 1.0e-3
     aligned_yaw: float = 0.07
     over_cup: float = 6e-3
     patience: float = 12.0
+    turning_back: float = 6.5
     carry_height: float = 45e-3
     drop_height: float = 27e-3
     hover: float = 20e-3
     climb_rate: float = 1.4
     carry_rate: float = 0.8
     calm: float = 0.8
-    cool: float = 50.0
+    cool: float = 2.0
     slipped: float = 8e-3
     phase_limit: float = 40.0
 
@@ -145,13 +149,16 @@ class PickAndPlace:
                 return "lower"
             case "lower" if abs(seen.tips - self._height) < 4e-4 or late:
                 return "pinch"
-            case "pinch" if self._calm > gains.calm or seen.temperature[_GRIPPER] < gains.cool:
+            case "pinch" if (
+                self._calm > gains.calm
+                or seen.temperature[_GRIPPER] < self._heat.body[_GRIPPER] + gains.cool
+            ):
                 return "lift"
             case "lift" if self.since > 1.0 and seen.object[2] < seen.gripper[2] - gains.slipped:
                 return "open" if self.tries < 3 else "done"
             case "lift" if seen.object[2] > gains.carry_height - 2e-3 or late:
                 return "turn back"
-            case "turn back" if abs(seen.yaw) < 0.2 or late:
+            case "turn back" if abs(seen.yaw) < 0.2 or self.since > gains.turning_back or late:
                 return "bend"
             case "bend" if (
                 float(np.linalg.norm(seen.object[:2] - seen.cup[:2]))

@@ -18,7 +18,8 @@ _DOWN = (0.0, 1.0, 0.0, 0.0)  # z of the module down, its TCA 0 towards x of the
 _RESTING = 4.0  # time after which a module at constant temperatures rests, see the docs [s]
 _AT_REST = 5e-5  # way of the tip in the last control period of that, if it does [m]
 _FOUND = 2e-5  # how near the search for temperatures comes, if it can [m]
-_PROBE, _STRIDE = 1.0, 30.0  # changes of temperature to find a slope, and of one round of it [K]
+# Changes of temperature to find a slope, of one round of the search, and the least of one [K].
+_PROBE, _STRIDE, _FINEST = 1.0, 30.0, 0.5
 
 
 class NoRest(ArithmeticError):
@@ -111,20 +112,30 @@ class StaticTip:
         angle = -2.0 * np.pi / TCAS * np.arange(TCAS)
         aside = np.cos(angle) * target[0] + np.sin(angle) * target[1]
         share = np.clip(0.4 + aside / 0.04, 0.1, 0.9)
-        found, before = ambient + share * (hottest - ambient), np.inf
-        while True:
-            tip = self.at(found)
-            gap = float(np.linalg.norm(tip - target))
-            moved = np.where(found + _PROBE > hottest, -_PROBE, _PROBE)
-            slope = np.stack(
-                [(self.at(found + way) - tip) / way.sum() for way in np.diag(moved)], axis=-1
-            )
-            if gap < _FOUND or gap > 0.9 * before:
-                return found, slope, gap
-            before = gap
+        found, stride = ambient + share * (hottest - ambient), _STRIDE
+        tip = self.at(found)
+        slope, gap = self._slope(found, tip, hottest), float(np.linalg.norm(tip - target))
+        while gap > _FOUND and stride > _FINEST:
             change = np.linalg.lstsq(slope, target - tip, rcond=None)[0]
-            change /= max(1.0, np.abs(change).max() / _STRIDE)
-            found = np.clip(found + change, ambient, hottest)
+            change /= max(1.0, np.abs(change).max() / stride)
+            tried = np.clip(found + change, ambient, hottest)
+            there = self.at(tried)
+            left = float(np.linalg.norm(there - target))
+            if left < 0.9 * gap:
+                found, tip, gap, stride = tried, there, left, _STRIDE
+                slope = self._slope(found, tip, hottest)
+            else:  # too far: the slope is another one there
+                stride = 0.5 * float(np.abs(change).max())
+        return found, slope, gap
+
+    def _slope(
+        self, temperature: NDArray[np.float64], tip: NDArray[np.float64], hottest: float
+    ) -> NDArray[np.float64]:
+        """Derivative of the tip's place, ``tip`` at these temperatures, shape (3, 3) [m/K]."""
+        moved = np.where(temperature + _PROBE > hottest, -_PROBE, _PROBE)
+        return np.stack(
+            [(self.at(temperature + way) - tip) / way.sum() for way in np.diag(moved)], axis=-1
+        )
 
 
 def hanging_module(spec: BendingSpec) -> Part:

@@ -73,7 +73,7 @@ class BendReach(SimulatedTask):
 
     max_power: ClassVar[float] = 2.0  # of each TCA, as in the arm [W]
     max_temperature: ClassVar[float] = 180.0  # annealing temperature, Sun, Table 2.1 [°C]
-    hot_temperature: ClassVar[float] = 140.0  # from about here on the module may roll over [°C]
+    hot_temperature: ClassVar[float] = 140.0  # 20 K below where the module may not rest [°C]
     hottest_target: ClassVar[float] = 130.0  # of a TCA, at rest at the target [°C]
     control_period: ClassVar[float] = PERIOD  # [s]
     tolerance: ClassVar[float] = 3e-3  # [m]

@@ -7,7 +7,6 @@ import subprocess
 import sys
 import warnings
 from copy import copy
-from dataclasses import replace
 from pathlib import Path
 
 import gymnasium as gym
@@ -61,7 +60,7 @@ def heated(env, temperature, steps):
     """Infos of an episode in which the TCAs are brought to temperatures and kept there."""
     control, infos = thermostat(env), []
     for _ in range(steps):
-        power = control.power(env.sim.temperature, temperature)
+        power = control.power(env.sim.temperature, temperature, env.sim.body_temperature)
         *_, info = env.step((2.0 * power / env.max_power - 1.0).astype(np.float32))
         infos.append(info)
     return infos
@@ -113,9 +112,9 @@ def test_it_starts_cold_and_at_rest(shared):
 def test_every_target_can_be_reached_and_kept(shared, seed, options):
     """From cold, with the power there is: heated to the temperatures of the target's draw."""
     _, info = shared.reset(seed=seed, options=options)
-    wanted = info["target_temperature"]
-    lost = shared.sim.bank.heat.loss * (wanted - shared.sim.bank.heat.ambient)
-    assert wanted.max() <= shared.hottest_target and lost.max() <= 0.9 * shared.max_power + 1e-12
+    wanted, heat = info["target_temperature"], shared.sim.bank.heat
+    needed = heat.keeping(wanted, heat.ambient)  # while the silicone is cold; later it takes less
+    assert wanted.max() <= shared.hottest_target and needed.max() <= 0.9 * shared.max_power + 1e-12
     assert info["distance_to_target"] > shared.tolerance
     infos = heated(shared, wanted, 90)
     assert infos[-1]["distance_to_target"] < 0.1e-3
@@ -126,13 +125,12 @@ def test_every_target_can_be_reached_and_kept(shared, seed, options):
 
 def test_where_it_rests_does_not_depend_on_what_was_before(shared):
     shared.reset(seed=0)
-    static, heat, random = shared.static, shared.sim.bank.heat, np.random.default_rng(3)
+    static, random = shared.static, np.random.default_rng(3)
     for share in ((1.0, 0.0, 0.0), (1.0, 1.0, 0.0), *random.uniform(0.0, 1.0, (3, 3))):
         wanted = 25.0 + np.array(share) * (shared.hottest_target - 25.0)
         rest = static.at(wanted)
         static.at(25.0 + random.uniform(0.0, 1.0, 3) * 125.0)
-        static.sim.tca = replace(static.sim.tca, temperature=wanted)
-        static.sim.step(heat.loss * (wanted - 25.0), 6.0)
+        static.sim.step(static.sim.keep(wanted), 6.0)
         assert np.linalg.norm(static.tip() - rest) < 2e-5
 
 
@@ -164,10 +162,10 @@ def test_a_given_target_is_found_or_refused(shared):
 
 
 def test_a_module_that_trembles_has_no_target_there(shared):
-    """One TCA far hotter than 140 °C and the others slack: no place of rest, so it is refused."""
+    """Two TCAs far hotter than 140 °C and one slack: no place of rest, so it is refused."""
     shared.reset(seed=0)
     with pytest.raises(NoRest, match=r"the tip moves .* m in 0\.1 s"):
-        shared.static.at([165.0, 25.0, 25.0])
+        shared.static.at([170.0, 170.0, 25.0])
     _, info = shared.reset(seed=2, options={"tca_gain": 4.0})
     infos = heated(shared, info["target_temperature"], 90)
     assert infos[-1]["distance_to_target"] < 0.1e-3
@@ -215,7 +213,7 @@ def test_the_observation_is_what_the_simulation_says(shared):
     now = copy(shared.data)
     mujoco.mj_kinematics(shared.model, now)
     way = later.site("bench.module.tip").xpos - now.site("bench.module.tip").xpos
-    assert tip[0] > 1e-3 and way[0] > 1e-9
+    assert tip[0] > 1e-3 and abs(way[0]) > 1e-9
     assert rows["tip velocity"] == pytest.approx(way / 1e-5, abs=1e-3 * np.abs(way).max() / 1e-5)
     assert rows["target position"] == pytest.approx(shared.target, rel=1e-6)
 
@@ -237,7 +235,7 @@ def test_success_asks_for_a_second_at_the_target(shared):
     _, info = shared.reset(seed=5)
     wanted, control, held = info["target_temperature"], thermostat(shared), 0
     for _ in range(200):
-        power = control.power(shared.sim.temperature, wanted)
+        power = control.power(shared.sim.temperature, wanted, shared.sim.body_temperature)
         action = (2.0 * power / shared.max_power - 1.0).astype(np.float32)
         observation, _, terminated, truncated, info = shared.step(action)
         held = held + 1 if info["distance_to_target"] <= 3e-3 else 0
