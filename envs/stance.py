@@ -28,20 +28,20 @@ CAMERAS = tuple(_VIEWS)
 
 BODIES = ("rigid", "elastic", "fine")
 
-# A foot of 0.3 g is pushed and pulled by forces that accelerate it by 200 m/s². Where contacts are
+# A foot of a gram is pushed and pulled by forces that accelerate it by 50 m/s². Where contacts are
 # so stiff that it rests at no depth, it loses the ground for single time steps, falls a millimetre
-# in each and is thrown on: the robot walks half as fast again, and the faster the longer the step.
-# Elliptic cones and an impedance of a half at the surface let a body rest 0.2 mm deep, below a
-# margin of as much. The ratio keeps splayed legs from creeping apart: 0.04 mm in 20 s, 7 mm at a
-# ratio of 10.
-_IMPEDANCE = (0.5, 0.99, 5e-4, 0.5, 2.0)
+# in each and is thrown on. Contacts therefore begin in a layer above the surface, soft at its
+# outside (impedance) and stiff within, in which robot and ground come to rest where the surfaces
+# are: the layer moves no surface. How thick it is and how fast it slows has no meaning, and no
+# influence on speeds (docs/tetrapod.md, scripts/tetrapod_contacts.py).
+_REST_TIME = 10e-3  # time constant of coming to rest, two time steps, MuJoCo's least [s]
+# A leg lands with up to 0.2 m/s, a millimetre in a time step, and is only seen once it is there.
+_LEG_MARGIN, _LEG_IMPEDANCE = 0.6e-3, (0.1, 0.99, 0.9e-3, 0.5, 2.0)
+# The body is much heavier than a foot: its contacts may be stiff. They must be, as its height above
+# the edges of a beam says how its legs press the beam in the shimmy.
+_BODY_MARGIN, _BODY_IMPEDANCE = 0.2e-3, (0.5, 0.999, 0.5e-3, 0.5, 2.0)
+# The ratio keeps splayed legs from creeping apart: 0.04 mm in 20 s, 7 mm at a ratio of 10.
 _IMPEDANCE_RATIO = 3000.0
-_MARGIN = 0.2e-3  # [m]
-# A foot lands with up to 0.2 m/s, a millimetre in a time step, and is only seen once it is there.
-# Its contact therefore begins 0.8 mm off, in a layer that it rests in at half its depth: then it
-# comes no deeper than 0.2 mm, and its contact is as steady at 5 ms as at 2.5 ms.
-_FOOT_MARGIN = 0.8e-3  # [m]
-_FOOT_TIME = 15e-3  # time in which what is in that layer comes to rest [s]
 
 _MARCH = 2e-3  # step downwards while the ground is looked for [m]
 _SPREAD = 0.12  # largest bend of each node of a leg that starts beside a beam [rad]
@@ -109,10 +109,10 @@ def _soften(part: Part) -> None:
     option.jacobian = mujoco.mjtJacobian.mjJAC_SPARSE  # four legs apart: two thirds of the time
     for geom in part.spec.geoms:
         if geom.priority > 0:  # the robot's: they decide on every contact
-            geom.solimp = _IMPEDANCE
-            geom.margin = _MARGIN
-            if geom.name.endswith(".foot"):
-                geom.margin, geom.solref = _FOOT_MARGIN, (_FOOT_TIME, 1.0)
+            leg = geom.name.endswith(".foot") or ".plate" in geom.name
+            geom.margin = _LEG_MARGIN if leg else _BODY_MARGIN
+            geom.solimp = _LEG_IMPEDANCE if leg else _BODY_IMPEDANCE
+            geom.solref = (_REST_TIME, 1.0)
 
 
 class Stance:
@@ -222,8 +222,7 @@ class Stance:
                 mujoco.mj_kinematics(self._model, data)
                 mujoco.mj_collision(self._model, data)
                 contact = data.contact
-                # About as deep as it will rest: a foot halfway in its layer, all else at 0.
-                near = contact.dist < 0.6 * (contact.includemargin - _MARGIN)
+                near = contact.dist < 0.0  # about where it will rest
                 steep = np.abs(contact.frame[:, 2]) > 0.5
                 return bool((near & steep).any()), bool((near & ~steep).any())
 
