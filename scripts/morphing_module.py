@@ -14,9 +14,9 @@ from typing import Any
 import imageio.v3 as imageio
 import mujoco
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
+from shape_memory import shade, shown
 
 from tca_mj.agents.morph import MorphPolicy
 from tca_mj.control.morph import Measurement, Phase
@@ -28,9 +28,6 @@ from tca_mj.smp.lumped import LumpedModule
 
 G, WEIGHT = 9.81, 15e-3  # Sun, Fig. 6.1: 15 g at the tip
 BLUE, ORANGE, GREEN, GREY = "#0072b2", "#d55e00", "#009e73", "#666666"
-SHADE = {Phase.SOFTEN: "#fbe3d0", Phase.MORPH: "#f7efe2", Phase.HOLD: "#e8f1e4",
-         Phase.HARDEN: "#dfeaf5", Phase.RELEASE: "#f2f2f2"}  # fmt: skip
-BETWEEN = (Phase.DONE, Phase.SOFTEN)
 DOWN = {"to its own side": (0, -1, 0), "to the other side": (0, 1, 0), "across": (1, 0, 0),
         "along the base": (0, 0, 1), "against the base": (0, 0, -1)}  # fmt: skip
 
@@ -218,29 +215,6 @@ def policy_table(seeds: int = 10) -> str:
             + f" | {info['time']:.1f} s | {joules} | {hottest:.0f} °C | {total:.1f} |"
         )
     return "\n".join([f"{sum(rows)} of {seeds}", "", *lines])
-
-
-def shown(rows: list[dict[str, Any]]) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Two spans of time [s]: each of two sequences until 25 s after its spine is rigid."""
-    pairs = zip(rows, rows[1:], strict=False)
-    again = next(b["time"] for a, b in pairs if (a["phase"], b["phase"]) == BETWEEN)
-    rigid = [r["time"] for r in rows if r["phase"] is Phase.HARDEN]
-    first = max(time for time in rigid if time < again)
-    return (0.0, first + 25.0), (again - 5.0, rigid[-1] + 25.0)
-
-
-def shade(axis: Axes, rows: list[dict[str, Any]], span: tuple[float, float], top: float) -> None:
-    """Colours the phases, and names them at a height if there is one."""
-    inside = [r for r in rows if span[0] <= r["time"] <= span[1]]
-    start = 0
-    for i in range(1, len(inside) + 1):
-        if i == len(inside) or inside[i]["phase"] is not inside[start]["phase"]:
-            phase = inside[start]["phase"]
-            ends = inside[start]["time"], inside[i - 1]["time"]
-            axis.axvspan(*ends, color=SHADE.get(phase, "white"), lw=0)
-            if top and ends[1] - ends[0] > 5.5:
-                axis.text(sum(ends) / 2.0, top, str(phase), ha="center", fontsize=8)
-            start = i
 
 
 def draw_course(path: Path) -> None:

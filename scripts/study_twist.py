@@ -17,8 +17,8 @@ from studies import BLUE, MUJOCO, ORANGE, REPORTED
 from tca_mj.model import settle
 from tca_mj.modules.twisting import TwistingSpec, twisting_module
 from tca_mj.rod import solve_static
-from tca_mj.sim import Simulation
 from tca_mj.tca import CoilRods, TcaSpec, law_at
+from tca_mj.validation.modules import turned
 
 # A helix of five turns needs at least 15 nodes.
 SPECS = {"double": TwistingSpec(), "single": TwistingSpec(double=False, nodes=20)}
@@ -38,18 +38,6 @@ def turn(spec: TwistingSpec, temperature: float, solve: Any = solve_static, **mo
     """Angle by which the tip turns [deg]."""
     law = law_at(tca(spec), temperature)
     return abs(studies.twist(solve(spec.body, [spec.route], [law], **more)))
-
-
-def powered(spec: TwistingSpec, power: float) -> float:
-    """The angle after 2 s of power by MuJoCo, no weight [deg]."""
-    part = twisting_module(spec)
-    part.spec.option.gravity = [0.0, 0.0, 0.0]
-    sim, angles = Simulation(part), [0.0]
-    for _ in range(20):
-        sim.step([power], 0.1)
-        r = sim.data.site(part.sites["tip"]).xmat.reshape(3, 3)
-        angles.append(float(np.arctan2(r[1, 0] - r[0, 1], r[0, 0] + r[1, 1])))
-    return abs(float(np.degrees(np.unwrap(angles)[-1])))
 
 
 def ratio(diameter: float, solve: Any = solve_static, **more: Any) -> float:
@@ -81,7 +69,7 @@ def compute() -> dict[str, Any]:
         "hot": hot,
         "theory": {n: np.array([turn(s, t) for m, s, t in cases if m == n]) for n in SPECS},
         "stiff": {n: turn(s, hot[n][14], shearable=False) for n, s in SPECS.items()},
-        "mujoco": {n: np.array([powered(s, p) for p in POWERS[::2]]) for n, s in SPECS.items()},
+        "mujoco": {n: np.array([turned(p, s) for p in POWERS[::2]]) for n, s in SPECS.items()},
         "ratio": [ratio(d) for d in DIAMETERS],
         "ratio, no shear": [ratio(d, shearable=False) for d in DIAMETERS],
         "ratio, MuJoCo": [ratio(d, settle) for d in DIAMETERS[::3]],
@@ -94,7 +82,7 @@ def table(data: dict[str, Any]) -> str:
     rows = []
     for power in (14.0, 16.0):
         k = int(np.flatnonzero(POWERS == power)[0])
-        exact, mj = data["theory"]["double"][k], powered(SPECS["double"], power)
+        exact, mj = data["theory"]["double"][k], turned(power, SPECS["double"])
         rows.append([f"double, {power:.0f} W for 2 s ({data['hot']['double'][k]:.0f} °C)",
                      f"{exact:.1f}°", "-", f"{mj:.1f}°", f"{100.0 * (mj / exact - 1.0):+.1f} %",
                      "-"])  # fmt: skip

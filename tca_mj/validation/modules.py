@@ -106,9 +106,8 @@ def rods() -> list[Finding]:
     ]  # fmt: skip
 
 
-def turned(power: float, *, double: bool = True) -> float:
-    """Turn of the wrist alone after 2 s of power, no weight [deg]."""
-    spec = TwistingSpec() if double else TwistingSpec(double=False, nodes=20)
+def turned(power: float, spec: TwistingSpec) -> float:
+    """Turn of a twisting module alone after 2 s of power, no weight [deg]."""
     part = twisting_module(spec)
     part.spec.option.gravity = [0.0, 0.0, 0.0]
     sim, angles = Simulation(part), [0.0]
@@ -122,8 +121,8 @@ def turned(power: float, *, double: bool = True) -> float:
 def wrist() -> list[Finding]:
     """Turn of the wrist (Sections 4.1.2 and 4.1.4): nothing is fitted to it."""
     printed = {14.0: 45.0, 16.0: 58.0, 28.0: 180.0}
-    angles = {power: turned(power) for power in printed}
-    single = turned(28.0, double=False)
+    angles = {power: turned(power, TwistingSpec()) for power in printed}
+    single = turned(28.0, TwistingSpec(double=False, nodes=20))
     exponent = math.log(angles[28.0] / angles[14.0]) / math.log(2.0)
     per = ", ".join(f"{1e3 * angle / power**2:.0f}" for power, angle in printed.items())
     least = 0.85 * printed[28.0] / angles[28.0]
