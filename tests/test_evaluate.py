@@ -146,7 +146,7 @@ def test_a_gaits_figures_are_those_of_the_episode():
     assert found["distance"] == info["distance"] and found["drift"] == abs(info["drift"])
     assert found["speed"] == pytest.approx(info["speed"]) and found["duration"] == info["time"]
     assert found["energy"] == pytest.approx(info["energy"].sum())
-    mass = info["variation"]["mass"] * 20.810e-3
+    mass = info["variation"]["mass"] * 21.862e-3
     assert found["weight"] == pytest.approx(9.81 * mass, rel=1e-3)
     assert found["success"] and found["ending"] == "time limit" and found["steps"] == 6
 

@@ -146,7 +146,7 @@ def test_the_ground_carries_the_weight(walker):
         for i, contact in enumerate(data.contact):
             mujoco.mj_contactForce(model, data, i, force)
             total += contact.frame.reshape(3, 3).T @ force[:3]
-        weight = 9.81 * mass * 20.810e-3  # of the default robot
+        weight = 9.81 * mass * 21.862e-3  # of the default robot
         assert abs(total[2]) == pytest.approx(weight, rel=0.01)
 
 
@@ -504,6 +504,51 @@ def test_feet_land_without_sinking_in(envs, gait, steps, monkeypatch):
     monkeypatch.setattr(mujoco, "mj_step", watched)
     follow(envs[gait], GaitPolicy.of(gait), steps)
     assert len(depths) > 20 * steps and max(depths) < 0.3e-3
+
+
+@pytest.mark.parametrize("gait", TASKS)
+def test_mirrored_actions_end_in_the_mirror_image(envs, gait):
+    """After 60 s, with a weaker left side, to a millionth of the distance."""
+    env, policy = envs[gait], GaitPolicy.of(gait)
+    straight = {"yaw": 0.0, "bend": TASKS[gait].bend}
+    observation, _ = env.reset(seed=0, options=straight)
+    actions = []
+    for _ in range(600):
+        action = policy.act(observation).reshape(4, 3)
+        action[[0, 2]] = 0.9 * (action[[0, 2]] + 1.0) - 1.0
+        actions.append(action)
+        observation, *_ = env.step(action.ravel())
+    one = env.data.qpos[:7].copy()
+    env.reset(seed=0, options=straight)
+    for action in actions:
+        env.step(action[[1, 0, 3, 2]].ravel())
+    other = env.data.qpos[:7] * [1.0, -1.0, 1.0, 1.0, -1.0, 1.0, -1.0]
+    distance = float(np.hypot(*one[:2]))
+    assert distance > 0.01 and np.abs(one[[1, 6]]).max() > 1e-5  # it went aside
+    assert np.abs(one[:3] - other[:3]).max() < 1e-6 * distance
+    assert np.abs(one[3:] - other[3:]).max() < 1e-6
+
+
+@pytest.mark.parametrize("gait", ["crawl", "walk"])
+def test_contacts_do_not_make_the_speed(envs, gait):
+    """Contacts without a layer, at a fifth of the step, and a layer twice as thick: within 5 %."""
+    distance = []
+    for change in (None, "hard", "thick"):
+        env = TetrapodGait(gait=gait, timestep=1e-3 if change == "hard" else 5e-3)
+        model = env.sim.model
+        mine = np.flatnonzero(model.geom_priority > 0)
+        if change == "hard":  # gives under a foot's load as much as a ball of silicone
+            model.geom_margin[mine] = 0.0
+            model.geom_solref[mine, 0] = 2e-3
+            model.geom_solimp[mine, :2] = 0.9
+        elif change == "thick":
+            model.geom_margin[mine] *= 2.0
+            model.geom_solimp[mine, 2] *= 2.0
+        infos = follow(env, GaitPolicy.of(gait), 90)
+        distance.append(infos[-1]["distance"] - infos[29]["distance"])
+    assert distance[0] > 5e-3
+    assert distance[0] == pytest.approx(distance[1], rel=0.05)
+    assert distance[0] == pytest.approx(distance[2], rel=0.05)
 
 
 def test_the_script_turns_to_where_it_is_told(walker):

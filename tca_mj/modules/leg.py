@@ -37,7 +37,8 @@ class LegSpec:
         plate_thickness: Thickness of the plates [m]. Estimate.
         plate_fill: Share of a plate's disc that is not cut out. Estimate.
         foot_radius: Radius of the round foot [m]. Estimate: then foot and not the rim of the last
-            plate touches as long as the leg leans by less than 67 degrees.
+            plate touches as long as the leg leans by less than 58 degrees, and the flat robot is
+            25 mm high.
         foot_mass: Mass of the foot [kg]. Estimate: a solid ball of silicone rubber, 1070 kg/m³.
         plate_friction: Coefficient of friction of the plates. Estimate: printed plastic on glass.
         friction: Coefficient of friction of the foot. Estimate: silicone rubber on glass or a
@@ -62,8 +63,8 @@ class LegSpec:
     plate_radius: float = 9e-3
     plate_thickness: float = 1e-3
     plate_fill: float = 0.5
-    foot_radius: float = 6e-3
-    foot_mass: float = 0.97e-3
+    foot_radius: float = 5e-3
+    foot_mass: float = 0.56e-3
     friction: float = 0.8
     plate_friction: float = 0.3
     damping_time: float = 20e-3
