@@ -1,9 +1,10 @@
 """Compares the tetrapod's model with a finer one and with theory; prints tables as Markdown.
 
-    python scripts/tetrapod_certificate.py rails bending legs gaits
+    python scripts/tetrapod_certificate.py rails bending legs gaits rods
 
 ``rails``: how far the two rails give under loads between them. ``bending``: how far the soft body
 is bent by its TCAs. ``legs``: where a loaded foot is. ``gaits``: how fast scripted gaits are.
+``rods``: how fast all gaits are on legs with other rods.
 """
 
 import argparse
@@ -17,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from tca_mj.agents.policy import load_policy
 from tca_mj.agents.tetrapod_gaits import GAITS, GaitPolicy
 from tca_mj.certify.rest import Load, rest
 from tca_mj.envs.tetrapod import TetrapodGait
@@ -32,6 +34,7 @@ from tca_mj.sim import Simulation
 from tca_mj.tca import law_at
 
 Array = NDArray[np.float64]
+RODS, WHO = (0.40e-3, 0.45e-3, 0.50e-3), ("scripted", "searched")
 SPEC = TetrapodSpec()
 SPINE = SPEC.spine
 COLD = 25.0
@@ -380,7 +383,30 @@ def gaits(seconds: float = 24.0) -> list[str]:
     return lines
 
 
-TABLES = {"rails": rails, "bending": bending, "legs": legs, "gaits": gaits}
+def rods(seconds: float = 60.0) -> list[str]:
+    """Table of the gaits on legs with thinner and thicker rods, by whom."""
+    lines = [f"| rod | {' | '.join(f'{name}, {who} [mm/s]' for name in GAITS for who in WHO)} |",
+             "|---" * (1 + len(GAITS) * len(WHO)) + "|"]  # fmt: skip
+    for diameter in RODS:
+        robot = replace(SPEC, leg=replace(SPEC.leg, rod_diameter=diameter))
+        cells = []
+        for name in GAITS:
+            for who in WHO:
+                env = TetrapodGait(gait=name, robot=robot)
+                learned = who == "searched"
+                policy = load_policy(f"tetrapod-{name}", env) if learned else GaitPolicy.of(name)
+                observation, info = env.reset(seed=0)
+                done = False
+                while info["time"] < seconds - 1e-9 and not done:
+                    observation, _, fell, broke, info = env.step(policy.act(observation))
+                    done = fell or broke
+                ended = f" until {info['time']:.0f} s" if done else ""
+                cells.append(f"{1e3 * info['speed']:.2f}{ended}")
+        lines.append(f"| {1e3 * diameter:.2f} mm | {' | '.join(cells)} |")
+    return lines
+
+
+TABLES = {"rails": rails, "bending": bending, "legs": legs, "gaits": gaits, "rods": rods}
 
 
 def main() -> None:

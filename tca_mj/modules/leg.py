@@ -47,7 +47,7 @@ class LegSpec:
             almost none.
         motions: Motions of each node. Without twist a foot under load is off by millimetres.
         nodes: Nodes of the chain, each with a plate behind it. A foot of three that twist is at
-            most 0.4 mm off theory at 0.05 N and 0.8 mm at 0.1 N; in the walk it carries 0.07 N.
+            most 0.3 mm off theory at 0.05 N and 0.5 mm at 0.1 N; in the walk it carries 0.07 N.
         tca: The kind of TCA, cut to the leg's length.
 
     Raises:
