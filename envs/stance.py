@@ -32,8 +32,8 @@ BODIES = ("rigid", "elastic", "fine")
 # so stiff that it rests at no depth, it loses the ground for single time steps, falls a millimetre
 # in each and is thrown on. Contacts therefore begin in a layer above the surface, soft at its
 # outside (impedance) and stiff within, in which robot and ground come to rest where the surfaces
-# are: the layer moves no surface. How thick it is and how fast it slows has no meaning; what it does
-# to speeds, up to 7 %, is in docs/tetrapod.md, by scripts/tetrapod_contacts.py.
+# are: the layer moves no surface. How thick it is and how fast it slows has no meaning; what that
+# does to speeds, up to 7 %, is in docs/tetrapod.md, by scripts/tetrapod_contacts.py.
 _REST_TIME = 10e-3  # time constant of coming to rest, two time steps, MuJoCo's least [s]
 # A leg lands with up to 0.2 m/s, a millimetre in a time step, and is only seen once it is there.
 _LEG_MARGIN, _LEG_IMPEDANCE = 0.6e-3, (0.1, 0.99, 0.9e-3, 0.5, 2.0)
