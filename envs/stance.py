@@ -28,18 +28,15 @@ CAMERAS = tuple(_VIEWS)
 
 BODIES = ("rigid", "elastic", "fine")
 
-# A foot of 0.6 g is pushed and pulled by forces that accelerate it by 100 m/s². Where contacts are
-# so stiff that it rests at no depth, it loses the ground for single time steps, falls a millimetre
-# in each and is thrown on. Contacts therefore begin in a layer above the surface, soft at its
-# outside (impedance) and stiff within, in which robot and ground come to rest where the surfaces
-# are: the layer moves no surface. How thick it is and how fast it slows has no meaning; what that
-# does to speeds, up to 7 %, is in docs/tetrapod.md, by scripts/tetrapod_contacts.py.
+# A foot of 0.6 g is pushed and pulled by forces that accelerate it by 100 m/s². Where a contact is
+# stiff from its first touch, a foot that is dragged loses the ground for single time steps, the
+# more of them the shorter they are, and slips in each. Contacts therefore begin in a layer above
+# the surface, soft at its outside (impedance) and stiff within, in which robot and ground come to
+# rest where the surfaces are: the layer moves no surface. The thinner it is, the less it changes;
+# in a thinner one than this, feet that land fall through it. What that and the other numbers do to
+# speeds is in docs/tetrapod.md, by scripts/tetrapod_contacts.py.
+_MARGIN, _IMPEDANCE = 0.2e-3, (0.1, 0.99, 0.3e-3, 0.5, 2.0)
 _REST_TIME = 10e-3  # time constant of coming to rest, two time steps, MuJoCo's least [s]
-# A leg lands with up to 0.2 m/s, a millimetre in a time step, and is only seen once it is there.
-_LEG_MARGIN, _LEG_IMPEDANCE = 0.6e-3, (0.1, 0.99, 0.9e-3, 0.5, 2.0)
-# The body is much heavier than a foot: its contacts may be stiff. They must be, as its height above
-# the edges of a beam says how its legs press the beam in the shimmy.
-_BODY_MARGIN, _BODY_IMPEDANCE = 0.2e-3, (0.5, 0.999, 0.5e-3, 0.5, 2.0)
 # The ratio keeps splayed legs from creeping apart: 0.04 mm in 20 s, 7 mm at a ratio of 10.
 _IMPEDANCE_RATIO = 3000.0
 
@@ -109,10 +106,7 @@ def _soften(part: Part) -> None:
     option.jacobian = mujoco.mjtJacobian.mjJAC_SPARSE  # four legs apart: two thirds of the time
     for geom in part.spec.geoms:
         if geom.priority > 0:  # the robot's: they decide on every contact
-            leg = geom.name.endswith(".foot") or ".plate" in geom.name
-            geom.margin = _LEG_MARGIN if leg else _BODY_MARGIN
-            geom.solimp = _LEG_IMPEDANCE if leg else _BODY_IMPEDANCE
-            geom.solref = (_REST_TIME, 1.0)
+            geom.margin, geom.solimp, geom.solref = _MARGIN, _IMPEDANCE, (_REST_TIME, 1.0)
 
 
 class Stance:
@@ -147,7 +141,9 @@ class Stance:
         beside = [name for name in joints if name.startswith("robot.outer") and ".bend_x" in name]
         self._beside = address(beside)
         nodes = range(spec.leg.nodes)
-        self._lifts = address([f"robot.{leg}.rod.bend_y{i}" for leg in LEGS for i in nodes])
+        self._lifts = np.stack(
+            [address([f"robot.{leg}.rod.bend_y{i}" for i in nodes]) for leg in LEGS]
+        )
         bodies = [model.body(int(body)).name for body in model.geom_bodyid]
         self._leg = np.full(model.ngeom, -1)  # which leg a geom belongs to
         for i, leg in enumerate(LEGS):
@@ -215,19 +211,20 @@ class Stance:
             turn = (math.cos(yaw / 2.0), 0.0, 0.0, math.sin(yaw / 2.0))
             data.qpos[self._q : self._q + 7] = (*position, above, *turn)
 
-            def at(height: float, spread: float) -> tuple[bool, bool]:
-                """Whether something is touched from above, and from the side."""
+            def at(height: float, spread: float | Array) -> tuple[bool, Array]:
+                """Whether something is touched from above, and by which legs from the side."""
                 data.qpos[self._q + 2] = height
-                data.qpos[self._lifts] = spread
+                data.qpos[self._lifts] = np.broadcast_to(spread, len(LEGS))[:, None]
                 mujoco.mj_kinematics(self._model, data)
                 mujoco.mj_collision(self._model, data)
                 contact = data.contact
                 near = contact.dist < 0.0  # about where it will rest
                 steep = np.abs(contact.frame[:, 2]) > 0.5
-                return bool((near & steep).any()), bool((near & ~steep).any())
+                legs = self._leg[contact.geom[near & ~steep]]
+                return bool((near & steep).any()), np.isin(np.arange(len(LEGS)), legs)
 
             # Legs pointing down stand on their feet, those below a beam's top only hang beside it.
-            aside = at(above - _MARCH, 0.0)[1]
+            aside = at(above - _MARCH, 0.0)[1].any()
             widest = _SPREAD if aside else 0.0
             high = above + 0.15
             while not at(high - _MARCH, widest)[0]:
@@ -235,9 +232,14 @@ class Stance:
                 if high < above - 0.15:
                     raise ValueError(f"position must be above something, got {position}")
             height = _bisect(lambda z: not at(z, widest)[0], high - _MARCH, high)
-            if aside:
-                widest = _bisect(lambda angle: not at(height, angle)[1], 0.0, widest)
-            at(height, widest)
+            spread = np.full(len(LEGS), widest)
+            for leg in range(len(LEGS) if aside else 0):  # each as wide as the beam is for it
+                def free(angle: float, leg: int = leg) -> bool:
+                    spread[leg] = angle
+                    return not at(height, spread)[1][leg]
+
+                spread[leg] = _bisect(free, 0.0, widest)
+            at(height, spread)
 
         return place
 

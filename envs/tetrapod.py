@@ -62,6 +62,9 @@ TASKS = {
     "shimmy": GaitTask(bend=math.radians(215.0), speed=0.75e-3, beam=0.12, yaw_range=0.005),
 }
 
+# Updates of the TCAs in a control step, at least. With a single one the searched walk is 2.3 %
+# faster than with an update in every physics step, with four 0.3 %: scripts/tetrapod_contacts.py.
+_UPDATES = 4
 _SETTLING = 0.5  # time in which the robot comes to rest after it is put down [s]
 _UPRIGHT = 0.5  # cosine of the tilt from which on it has fallen over
 _SUNK = 12e-3  # depth below its first height at which it has fallen off the beam [m]
@@ -155,7 +158,7 @@ class TetrapodGait(SimulatedTask):
             objects,
             self.robot,
             timestep=timestep,
-            period=self.control_period,
+            period=_period(self.control_period, timestep),
             body=body,
             bend=self.task.bend,
         )
@@ -337,6 +340,21 @@ class TetrapodGait(SimulatedTask):
             "tension": sim.tension.copy(),
             "variation": self._varied.copy(),
         }
+
+
+def _period(control_period: float, timestep: float) -> float:
+    """The longest time between updates of the TCAs of which there are enough in a control step.
+
+    Raises:
+        ValueError: If the control period is no multiple of the time step.
+    """
+    steps = round(control_period / timestep) if timestep > 0.0 else 0
+    if steps < 1 or abs(steps * timestep - control_period) > 1e-9:
+        raise ValueError(
+            f"timestep must be {control_period} s over a whole number, got {timestep}"
+        )
+    updates = next((n for n in range(_UPDATES, steps) if steps % n == 0), steps)
+    return control_period / updates
 
 
 TetrapodGaitVector = partial(TaskVector, TetrapodGait)

@@ -390,7 +390,7 @@ def test_bad_actions_are_refused(walker, action, message):
         ({"camera": "back"}, "camera must be one of .* got 'back'"),
         ({"body": "soft"}, r"body must be one of \['rigid', 'elastic', 'fine'\], got 'soft'"),
         ({"size": (0, 10)}, r"size must be at least 1 pixel each way, got \(0, 10\)"),
-        ({"timestep": 3e-3}, r"tca_period must be a positive multiple of timestep 0\.003 s"),
+        ({"timestep": 3e-3}, r"timestep must be 0\.1 s over a whole number, got 0\.003"),
     ],
 )
 def test_bad_arguments_are_refused(arguments, message):
