@@ -211,7 +211,7 @@ class Stance:
             turn = (math.cos(yaw / 2.0), 0.0, 0.0, math.sin(yaw / 2.0))
             data.qpos[self._q : self._q + 7] = (*position, above, *turn)
 
-            def at(height: float, spread: float | Array) -> tuple[bool, Array]:
+            def at(height: float, spread: float | Array) -> tuple[bool, NDArray[np.bool_]]:
                 """Whether something is touched from above, and by which legs from the side."""
                 data.qpos[self._q + 2] = height
                 data.qpos[self._lifts] = np.broadcast_to(spread, len(LEGS))[:, None]
