@@ -16,8 +16,8 @@ help:  ## this list
 	@sed -n 's/^\([a-z]*\):.*## */  make \1	/p' Makefile
 
 demo: $(INSTALLED)  ## the arm moves a screwdriver and a circuit board; recordings in runs/demo
-	$(BIN)/tca-mj demo pick-and-place --object screwdriver --out $(DEMO)/screwdriver
-	$(BIN)/tca-mj demo pick-and-place --object pcb --out $(DEMO)/pcb
+	$(BIN)/tca-mj demo pick-and-place --option object=screwdriver --out $(DEMO)/screwdriver
+	$(BIN)/tca-mj demo pick-and-place --option object=pcb --out $(DEMO)/pcb
 	@for object in screwdriver pcb; do \
 	    echo "$$object:"; \
 	    for file in summary.json rollout.rrd rollout.mp4; do \

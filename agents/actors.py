@@ -1,6 +1,5 @@
 """Who acts in a task, by name: its script, nobody, chance, or a saved policy."""
 
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from importlib import import_module
 from pathlib import Path
@@ -9,23 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tca_mj.agents.course import CourseWalker
-from tca_mj.agents.morph import MorphPolicy
 from tca_mj.agents.policy import Policy, load_policy
-from tca_mj.agents.reach import ReachPolicy
-from tca_mj.agents.scripted import PickAndPlace
-from tca_mj.agents.tetrapod_gaits import GaitPolicy
 
 NAMES = ("scripted", "off", "random")
-
-_SCRIPTS: dict[str, Callable[[Any], Policy]] = {
-    "ArmPickPlace": lambda task: PickAndPlace(),
-    "BendReach": lambda task: ReachPolicy(task.module_spec),
-    "MorphModule": lambda task: MorphPolicy(),
-    "TetrapodCourse": CourseWalker,
-    "TetrapodGait": lambda task: GaitPolicy.of(task.gait),
-}
-
 
 @dataclass(slots=True)
 class Still:
@@ -88,22 +73,32 @@ def actor(name: str | Path, env: Any, *, seed: int = 0) -> Policy:
 
     Raises:
         FileNotFoundError: If there is no such policy.
-        ValueError: If it is one for another task.
+        ValueError: If it is one for another task, or the task has no script.
     """
-    task = env.unwrapped
     if str(name) not in NAMES:
         return load_policy(best_of(name), env)
     if name == "scripted":
-        return _SCRIPTS[type(task).__name__](task)
+        return scripted(env)
     if name == "random":
         return Chance(env.action_space.shape[0], seed)
-    table = import_module(type(task).__module__).ACTION
-    space = env.action_space
-    still = np.array(0.5 * (space.low + space.high), dtype=space.dtype)
-    for entry in table.entries:
-        if "power" in entry.name or "voltage" in entry.name:
-            still[table.slices[entry.name]] = space.low[table.slices[entry.name]]
-    return Still(still)
+    return Still(env.unwrapped.action.still)
+
+
+def scripted(env: Any) -> Policy:
+    """The scripted policy of an environment's task.
+
+    Raises:
+        ValueError: If it has none.
+    """
+    task = env.unwrapped
+    maker = task.scripted
+    if maker is None:
+        raise ValueError(f"policy 'scripted': {type(task).__name__} has none")
+    if isinstance(maker, str):
+        module, _, name = maker.partition(":")
+        maker = getattr(import_module(module), name)
+    policy: Policy = maker(task)
+    return policy
 
 
 def best_of(name: str | Path) -> str | Path:

@@ -4,15 +4,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from tca_mj.registry import TASKS
+from tca_mj.registry import task_class
 from tca_mj.rod.beam import require_count, require_positive
 
 ALGORITHMS = ("ppo", "sac", "td3")
 
-# Steps of a run if nothing is said. The reach is learned in a third of these (docs/training.md);
-# for all other tasks they are a guess.
-_STEPS = 500_000
-_TRIED = {("TCA/BendReach-v0", "ppo"): 60_000, ("TCA/BendReach-v0", "sac"): 60_000}
+_STEPS = 500_000  # of a run if neither the caller nor the task says: a guess
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -131,8 +128,7 @@ class TrainConfig:
     evaluation_episodes: int = 5
 
     def __post_init__(self) -> None:
-        if self.task not in [task.id for task in TASKS]:
-            raise ValueError(f"task must be one of this package's, got {self.task!r}")
+        task = task_class(self.task)
         if self.algorithm not in ALGORITHMS:
             raise ValueError(f"algorithm must be one of {ALGORITHMS}, got {self.algorithm!r}")
         kind = OnPolicy if self.algorithm == "ppo" else OffPolicy
@@ -144,17 +140,12 @@ class TrainConfig:
         )  # fmt: skip
         if not 0.0 <= self.residual <= 50.0:
             raise ValueError(f"residual must be between 0 and 50 K, got {self.residual}")
-        if self.residual and not is_gait_task(self.task):
+        if self.residual and not task.legs:
             raise ValueError(f"residual must be 0 for {self.task}, which has no gait")
 
 
-def is_gait_task(task: str) -> bool:
-    """Whether a gait can do the task."""
-    return task.startswith(("TCA/TetrapodCrawl", "TCA/TetrapodWalk", "TCA/TetrapodShimmy"))
-
-
 def default_config(task: str, algorithm: str, **change: Any) -> TrainConfig:
-    """The default for a task; only those of ``TCA/BendReach-v0`` were tried to the end.
+    """The default for a task; tried to the end only where the task says in how many steps.
 
     Args:
         task: Gymnasium id.
@@ -166,7 +157,7 @@ def default_config(task: str, algorithm: str, **change: Any) -> TrainConfig:
     """
     learner: OnPolicy | OffPolicy = OnPolicy() if algorithm == "ppo" else OffPolicy()
     common: dict[str, Any] = {"task": task, "algorithm": algorithm, "learner": learner}
-    common["steps"] = _TRIED.get((task, algorithm), _STEPS)
-    if is_gait_task(task):
-        common["options"] = {"randomise": 0.2}
+    known = task_class(task)
+    common["steps"] = known.learning_steps.get(algorithm, _STEPS)
+    common["options"] = dict(known.learning_options)
     return TrainConfig(**common | change)

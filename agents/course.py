@@ -23,11 +23,8 @@ PUSH = replace(WALK, offset=(0.0,) * 4)
 HURRY = replace(SHIMMY, period=11.5, hot=(170.0, 150.0, 170.0))
 """The shimmy with stronger strokes: the beam is wider than the one of its task."""
 
-STEP = Gait(
-    period=4.0, offset=(0.0, 0.5, 0.5, 0.0), start=(0.0, 0.5, 0.5), duty=(0.5,) * 3,
-    hot=(150.0,) * 3, warm=(40.0,) * 3,
-)  # fmt: skip
-"""Steps with little headway: a foot that is lifted does not hold the body down by its friction."""
+STEP = WALK
+"""Steps while the body bends: a foot that is lifted does not hold the body by its friction."""
 
 _OFF = 25.0  # temperature at which nothing is heated [°C]
 # A leg curled inwards: where friction holds its foot, it turns the rail outwards.

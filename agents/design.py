@@ -4,20 +4,8 @@ from collections.abc import Mapping
 from dataclasses import fields, is_dataclass, replace
 from typing import Any
 
-from tca_mj.modules.bending import BendingSpec
-from tca_mj.modules.morphing import MorphingSpec
-from tca_mj.registry import TASKS
-from tca_mj.robots.arm import ArmSpec
-from tca_mj.robots.tetrapod import TetrapodSpec
+from tca_mj.registry import task_class
 from tca_mj.tca import CATALOGUE, TcaSpec
-
-# Argument of each task's class that is the robot, and the default.
-_ROBOTS: dict[str, tuple[str, Any]] = {
-    "ArmPickPlace": ("arm_spec", ArmSpec),
-    "BendReach": ("module_spec", BendingSpec),
-    "MorphModule": ("module_spec", lambda: MorphingSpec(motions=("bend_x",))),
-    "TetrapodGait": ("robot", TetrapodSpec),
-}
 
 
 def robot_of(task: str, design: Mapping[str, Any]) -> dict[str, Any]:
@@ -31,10 +19,10 @@ def robot_of(task: str, design: Mapping[str, Any]) -> dict[str, Any]:
     Raises:
         ValueError: If the task has no such robot, there is no such figure, or the value cannot be.
     """
-    name = next(known.entry_point for known in TASKS if known.id == task).partition(":")[2]
-    if name not in _ROBOTS:
+    robot = task_class(task).robot_argument
+    if robot is None:
         raise ValueError(f"design must be empty for {task}, got {sorted(design)}")
-    argument, default = _ROBOTS[name]
+    argument, default = robot
     return {argument: designed(default(), design)}
 
 

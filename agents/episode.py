@@ -7,14 +7,15 @@ from collections import defaultdict
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from tca_mj.envs.base import how_it_ended
+from tca_mj.agents.policy import Policy
+from tca_mj.envs.task import Headway, how_it_ended
 from tca_mj.envs.wrappers import RecordRerun
 from tca_mj.film import Film
 from tca_mj.machine import machine, versions
@@ -27,14 +28,6 @@ _FPS = 20.0  # of the film: a picture costs as much as half a second of simulati
 _BAR = "{desc:9} |{bar}| {n:.1f} of at most {total:.0f} s simulated, {elapsed} real"
 
 
-class Policy(Protocol):
-    """A policy that works in phases, as ``tca_mj.agents.scripted.PickAndPlace`` does."""
-
-    @property
-    def phase(self) -> str: ...
-    def act(self, observation: NDArray[np.float32]) -> NDArray[np.float32]: ...
-
-
 class Episode:
     """One episode under way, and what was seen of it so far."""
 
@@ -45,9 +38,7 @@ class Episode:
         *,
         seed: int,
         out: Path | None,
-        bend: Callable[[], float],
         options: Mapping[str, Any] | None = None,
-        camera: str = "front",
         title: str = "",
     ) -> None:
         """Resets the environment; only then are the files in ``out`` touched.
@@ -57,14 +48,12 @@ class Episode:
             policy: Who acts.
             seed: Seed of the episode.
             out: Folder for the files; None to write nothing.
-            bend: The angle that the plot shows [deg].
             options: Options of the reset.
-            camera: Camera of the film.
             title: What the plot is called, before how it ended.
         """
         self.env, self.policy, self.seed, self.out = env, policy, seed, out
-        task: Any = env.unwrapped
-        self.sim = task.sim
+        self.task: Any = env.unwrapped
+        self.sim = self.task.sim
         self.ending = ""
         self.success = False
         self.total = 0.0  # of the rewards
@@ -72,9 +61,10 @@ class Episode:
         self.wall: dict[str, float] = defaultdict(float)
         self.left_out: dict[str, str] = {}
         self._film: Film | None = None
-        self._bend, self._camera, self._title = bend, camera, title
+        self._title = title
         self.observation, self.info = env.reset(seed=seed, options=dict(options or {}))
         self.clock: list[float] = []
+        self.places: list[Headway | None] = []
         self.samples: dict[str, list[Any]] = defaultdict(list)
         self.phases: list[tuple[float, str]] = [(0.0, policy.phase)]
         self._event(policy.phase)
@@ -140,10 +130,11 @@ class Episode:
         self.wall["simulation"] -= self._recorded() - recorded
         self.wall["recording"] = self._recorded()
         self._sample()
-        self.success = bool(self.info.get("success", False))
+        self.ending = how_it_ended(terminated, truncated, self.info) or ""
+        whole = truncated and "truncation_reason" not in self.info
+        self.success = self.info["success"] or bool(whole and self.task.legs)
         if self.info.get("touched", False) and not self.success:
             self.held_until = phase
-        self.ending = how_it_ended(terminated, truncated, self.info) or ""
         if self._film is not None:
             with self._timed("video"):
                 self._film.frame()
@@ -156,6 +147,8 @@ class Episode:
         return {
             "seed": self.seed,
             "success": self.success,
+            "return": self.total,
+            "held_until": self.held_until,
             "ending": self.ending or "still running",
             "duration": round(end, 6),
             "wall": {purpose: round(seconds, 3) for purpose, seconds in self.wall.items()},
@@ -167,11 +160,33 @@ class Episode:
             "energy": _by_name(names, self.sim.energy),
             "peak_temperature": _by_name(names, np.max(self.samples["temperature"], axis=0)),
             "peak_tension": _by_name(names, np.max(self.samples["tension"], axis=0)),
+            **self._headway(),
             "versions": versions(),
             "machine": machine(),
             "files": [n for n in written if self.out is not None and (self.out / n).is_file()],
             "left_out": self.left_out,
         }
+
+    def _headway(self) -> dict[str, Any]:
+        """How far a robot has got that is to get on, and how fast in each phase."""
+        way = np.array([[place.along, place.aside] for place in self.places if place is not None])
+        if not len(way):
+            return {}
+        rows = []
+        starts = [start for start, _ in self.phases]
+        for (start, name), end in zip(self.phases, [*starts[1:], self.clock[-1]], strict=True):
+            ends = np.interp([start, end], self.clock, way[:, 0])
+            distance = float(ends[1] - ends[0])
+            rows.append(
+                {
+                    "name": name,
+                    "distance": round(distance, 6),
+                    "speed": round(distance / max(end - start, 1e-9), 6),
+                    "published": self.task.published_speed.get(name),
+                }
+            )
+        distance, drift = (way[-1] - way[0]).tolist()
+        return {"distance": distance, "drift": drift, "speeds": rows}
 
     def _write(self, summary: Callable[[], dict[str, Any]]) -> None:
         """Replaces the file in one go, so that there is always a whole one."""
@@ -187,7 +202,7 @@ class Episode:
         if self.out is not None:
             with self._timed("video"), self._attempt(VIDEO):
                 path = self.out / VIDEO
-                self._film = Film(self.sim, path, fps=_FPS, speed=speed, camera=self._camera)
+                self._film = Film(self.sim, path, fps=_FPS, speed=speed, camera=self.task.camera)
                 self._film.frame()
 
     def _end_film(self) -> None:
@@ -258,7 +273,8 @@ class Episode:
         for name in ("power", "temperature", "tension"):
             self.samples[name].append(np.array(getattr(sim, name)))
         self.samples["body"].append(np.where(sim.embedded, sim.body_temperature, np.nan))
-        self.samples["bend"].append(self._bend())
+        self.samples["bend"].append(np.degrees(self.task.bent()))
+        self.places.append(self.task.headway())
 
 
 def _by_name(names: tuple[str, ...], values: NDArray[np.float64]) -> dict[str, float]:

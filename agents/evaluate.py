@@ -23,15 +23,13 @@ from tqdm import tqdm
 
 import tca_mj  # noqa: F401  (registers the tasks in a new process)
 from tca_mj.agents.actors import NAMES, actor, best_of
-from tca_mj.agents.design import designed, robot_of
+from tca_mj.agents.design import robot_of
 from tca_mj.agents.policy import find, write_whole
-from tca_mj.envs.base import how_it_ended
+from tca_mj.envs.task import how_it_ended
 from tca_mj.machine import machine, versions
-from tca_mj.registry import TASKS
-from tca_mj.robots.tetrapod import TetrapodSpec
+from tca_mj.registry import task_class
 
 EPISODES, SUMMARY, REPORT = "episodes.jsonl", "summary.json", "summary.md"
-MODELS = ("used", "legs", "fine")
 
 # Name, unit, factor to the unit, and digits of what is reported.
 METRICS = {
@@ -50,24 +48,19 @@ METRICS = {
 _RATIOS = ("energy_per_metre", "cost_of_transport")
 _LEVEL, _RESAMPLES = 0.95, 10_000
 
-# A finer leg. It has a plate at its root and behind each node, which together keep their mass.
-_FINE_LEG = {"leg.nodes": 10}
-
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Evaluation:
     """What is evaluated.
 
     Attributes:
-        task: Gymnasium id.
+        task: Gymnasium id, or ``module:id``.
         policy: Who acts, see ``tca_mj.agents.actors.actor``.
         episodes: How many episodes, at least 1.
         seed: Seed of the first one; the others follow.
-        randomise: Share by which the robot is off, as the task's option ``randomise`` (in the
-            course ``randomise_robot`` as well); 0 is nominal.
+        randomise: Share by which the robot is off, the task's option ``randomise``; 0 is nominal.
         steps: Control steps after which an episode is over; None for the task's own limit.
-        model: ``used``; or, for the tetrapod's gaits, ``legs`` (ten nodes a leg, of the
-            same mass) or ``fine`` (those legs, and every spine an elastic chain of its own).
+        model: ``used``, or the name of one of the task's finer models.
         timestep: Physics time step [s]; None for the task's own.
         design: Figures of the robot that differ from the default, see
             ``tca_mj.agents.design.robot_of``.
@@ -87,17 +80,13 @@ class Evaluation:
     design: Mapping[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        known = [task.id for task in TASKS]
-        if self.task not in known:
-            raise ValueError(f"task must be one of {known}, got {self.task!r}")
-        if self.model not in MODELS:
-            raise ValueError(f"model must be one of {MODELS}, got {self.model!r}")
-        if self.model != "used" and not self._is_gait:
-            raise ValueError(f"model must be 'used' for {self.task}, got {self.model!r}")
+        models = ("used", *task_class(self.task).finer)
+        if self.model not in models:
+            raise ValueError(
+                f"model must be one of {models} for {self.task}, got {self.model!r}"
+            )
         if not 0.0 <= self.randomise <= 0.5:
             raise ValueError(f"randomise must be between 0 and 0.5, got {self.randomise}")
-        if self.randomise and not self._options(self.randomise):
-            raise ValueError(f"randomise must be 0, as {self.task} varies nothing")
         if self.design:
             robot_of(self.task, self.design)
         for name, value, least in (
@@ -107,20 +96,9 @@ class Evaluation:
                 raise ValueError(f"{name} must be a whole number of at least {least}, got {value}")
 
     @property
-    def _is_gait(self) -> bool:
-        return self.task in {task.id for task in TASKS if "gait" in task.kwargs}
-
-    def _options(self, share: float) -> dict[str, float]:
-        """Options of the reset that vary the robot."""
-        if self._is_gait or "BendReach" in self.task:
-            return {"randomise": share}
-        course = "TetrapodCourse" in self.task
-        return {"randomise": share, "randomise_robot": share} if course else {}
-
-    @property
     def options(self) -> dict[str, float]:
         """Options of the reset."""
-        return self._options(self.randomise) if self.randomise else {}
+        return {"randomise": self.randomise} if self.randomise else {}
 
     def key(self) -> str:
         """Tells apart what must not be mixed: settings, the policy's contents, versions."""
@@ -140,15 +118,12 @@ class Evaluation:
             ValueError: If the time step does not fit.
         """
         more: dict[str, Any] = {} if self.timestep is None else {"timestep": self.timestep}
-        design = dict(self.design)
+        task = task_class(self.task)
+        if self.design:
+            more |= robot_of(self.task, self.design)
         if self.model != "used":
-            leg = designed(TetrapodSpec(), design).leg
-            design |= _FINE_LEG
-            if self.model == "fine":
-                more["body"] = "fine"
-                design |= {"nodes": 6}
-            design["leg.plate_fill"] = leg.plate_fill * (leg.nodes + 1) / 11.0
-        more |= robot_of(self.task, design) if design else {}
+            argument, default = task.robot_argument
+            more |= task.finer[self.model](more.get(argument) or default())
         return gym.make(self.task, max_episode_steps=self.steps, **more)
 
 
@@ -168,7 +143,7 @@ def run_episode(evaluation: Evaluation, seed: int) -> dict[str, Any]:
         observation, info = env.reset(seed=seed, options=evaluation.options)
         policy.reset()
         task: Any = env.unwrapped
-        sim, start = task.sim, _place(info)
+        sim, start = task.sim, task.headway()
         total, steps, ended, truncated = 0.0, 0, False, False
         hottest, tightest = -np.inf, 0.0
         while not ended:
@@ -182,32 +157,24 @@ def run_episode(evaluation: Evaluation, seed: int) -> dict[str, Any]:
             "steps": steps,
             "ending": how_it_ended(terminated, truncated, info) or "",
             "return": total,
-            "success": bool(info.get("success", whole)),
+            "success": bool(info["success"] or (whole and task.legs)),
             "duration": float(sim.time),
             "energy": float(sim.energy.sum() + sim.spines.energy.sum()),
             "peak_temperature": hottest,
             "peak_tension": tightest,
         }
-        end = _place(info)
+        end = task.headway()
         if start is not None and end is not None:
-            along, aside = end[0] - start[0], end[1] - start[1]
-            hub = task.model.body("robot.hub").id
+            along = end.along - start.along
             row |= {
                 "distance": along,
-                "drift": abs(aside),
+                "drift": abs(end.aside - start.aside),
                 "speed": along / sim.time,
-                "weight": 9.81 * float(task.model.body_subtreemass[hub]),
+                "weight": end.weight,
             }
         return row
     finally:
         env.close()
-
-
-def _place(info: dict[str, Any]) -> tuple[float, float] | None:
-    """Where a robot that gets on is, along its way and aside [m]."""
-    if "position" in info:
-        return float(info["position"][0]), float(info["position"][1])
-    return (float(info["distance"]), float(info["drift"])) if "distance" in info else None
 
 
 def evaluate(

@@ -8,10 +8,8 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 
-from tca_mj.agents.tetrapod_gaits import GaitPolicy
+from tca_mj.agents.gait_policy import GaitPolicy
 from tca_mj.control import Gait
-from tca_mj.envs.stance import LEG_TCAS
-from tca_mj.envs.tetrapod import TetrapodGait
 
 # Where penalties begin, somewhat within what is demanded of a gait, and how much they cost. The
 # demands: no more energy per metre than the scripted gait, a drift below 20 %, at most 180 °C and
@@ -29,11 +27,11 @@ class Trial:
     """One episode to run.
 
     Attributes:
-        task: Gymnasium id of one of the tetrapod's gait tasks.
+        task: Gymnasium id of a task with legs.
         gait: The gait.
         steering: As in ``GaitPolicy``, per leg [K/rad].
         seed: Seed of the episode.
-        randomise: Spread of the variation, as in the reset of ``TetrapodGait``.
+        randomise: Spread of the variation, as the option ``randomise`` of the task.
         settling: Time that is not judged, in which the TCAs become warm; rounded to whole cycles
             [s].
         window: Time that is judged, rounded to whole cycles, at least one [s].
@@ -73,8 +71,10 @@ class Headway:
 
 def run_trial(trial: Trial) -> Headway:
     """Runs an episode. What comes out depends on ``trial`` alone."""
-    env, policy = _env(trial.task), GaitPolicy(trial.gait, trial.steering)
-    cycle = trial.gait.period / TetrapodGait.control_period
+    env = _env(trial.task)
+    policy = GaitPolicy.in_task(env, trial.gait, trial.steering)
+    period, tcas = policy.control_period, policy.heat.capacity.size
+    cycle = trial.gait.period / period
     first = round(round(trial.settling / trial.gait.period) * cycle)
     steps = first + round(max(1, round(trial.window / trial.gait.period)) * cycle)
     options = {"randomise": trial.randomise, "direction": 0.0}
@@ -82,15 +82,15 @@ def run_trial(trial: Trial) -> Headway:
     begin, hottest, tightest, done = info, 0.0, 0.0, 0
     for done in range(1, steps + 1):
         observation, _, terminated, truncated, info = env.step(policy.act(observation))
-        hottest = max(hottest, float(info["temperature"][:LEG_TCAS].max()))
-        tightest = max(tightest, float(info["tension"][:LEG_TCAS].max()))
+        hottest = max(hottest, float(info["temperature"][:tcas].max()))
+        tightest = max(tightest, float(info["tension"][:tcas].max()))
         if done == first:
             begin = info
         if terminated or truncated:
             break
     # An early end leaves less distance for the same time; the power is that of the time walked.
-    judged = (steps - first) * TetrapodGait.control_period
-    walked = max(done - first, 1) * TetrapodGait.control_period
+    judged = (steps - first) * period
+    walked = max(done - first, 1) * period
     moved = done > first
     return Headway(
         speed=(info["distance"] - begin["distance"]) / judged if moved else 0.0,

@@ -1,21 +1,19 @@
 """Gaits as points of a unit cube, in which a search may look for better ones."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tca_mj.control import Gait
-from tca_mj.envs.tetrapod import TetrapodGait
 
 Array = NDArray[np.float64]
 
-# Bounds of the search. Estimates, wide about all scripted gaits; the hottest temperature is the
-# one from which on the tasks charge heat, 8 K below the limit of the material.
+# Bounds of the search. Estimates, wide about all scripted gaits.
 PERIOD = (2.0, 20.0)  # [s], on a logarithmic scale
 DUTY = (0.05, 0.95)
-HOT = (60.0, TetrapodGait.hot_temperature)  # [°C]
+COOLEST = 60.0  # least temperature of what is hot [°C]
 COLD = 25.0  # a TCA is kept between here and ``hot`` where it is not hot [°C]
 STEERING = (0.0, 1200.0)  # [K/rad]
 
@@ -35,12 +33,14 @@ class GaitSpace:
 
     Attributes:
         centre: The gait about which offsets and starts are counted.
+        hottest: Largest temperature of a gait [°C].
 
     Raises:
         ValueError: If it has not four legs with three TCAs, or is not the same left and right.
     """
 
     centre: Gait
+    hottest: float
 
     def __post_init__(self) -> None:
         if self.centre.table("start").shape != (4, _TCAS):
@@ -78,7 +78,7 @@ class GaitSpace:
         Raises:
             ValueError: If left and right differ.
         """
-        GaitSpace(centre=gait)
+        replace(self, centre=gait)
         if any(steering[pair][0] != steering[pair][1] for pair in _PAIRS.values()):
             raise ValueError(f"steering must be the same left and right, got {steering}")
         offset, start = np.array(gait.offset), gait.table("start")
@@ -92,7 +92,7 @@ class GaitSpace:
             point += list((start[i] - self.centre.table("start")[i] + 0.5)[1:] % 1.0)
             hot = gait.table("hot")[i]
             point += [_share(duty, *DUTY) for duty in gait.table("duty")[i]]
-            point += [_share(value, *HOT) for value in hot]
+            point += [_share(value, COOLEST, self.hottest) for value in hot]
             point += list((gait.table("warm")[i] - COLD) / (hot - COLD))
             point.append(_share(steering[i], *STEERING))
         return np.clip(point, 0.0, 1.0)
@@ -122,7 +122,7 @@ class GaitSpace:
             start = self.centre.table("start")[pair.start]
             start[1:] = (start[1:] + row(_TCAS - 1) - 0.5) % 1.0
             duty = _between(row(), *DUTY)
-            hot = _between(row(), *HOT)
+            hot = _between(row(), COOLEST, self.hottest)
             warm = np.minimum(COLD + row() * (hot - COLD), hot)
             rows = {"start": start, "duty": duty, "hot": hot, "warm": warm}
             for name, value in rows.items():

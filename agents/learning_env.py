@@ -2,7 +2,7 @@
 
 import pickle
 from collections import defaultdict
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 from stable_baselines3.common.vec_env import VecEnvWrapper
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvStepReturn
 
+from tca_mj.agents.gait_policy import GaitPolicy
 from tca_mj.agents.policy import with_clock
 from tca_mj.agents.sb3_env import TaskVecEnv
-from tca_mj.agents.tetrapod_gaits import GaitPolicy
+from tca_mj.control import Gait
 
 Observations = NDArray[np.float32]
 
@@ -21,7 +22,7 @@ Observations = NDArray[np.float32]
 class LearningEnv(VecEnvWrapper):
     """Several tasks, and statistics of their episodes.
 
-    With ``walker`` an action is a correction of the temperatures of a gait, 1 being ``bound``, and
+    With ``gait`` an action is a correction of the temperatures of a gait, 1 being ``bound``, and
     an observation ends with sine and cosine of the gait's phase: what is learned is the network of
     a ``tca_mj.agents.policy.ResidualPolicy``.
 
@@ -35,23 +36,25 @@ class LearningEnv(VecEnvWrapper):
     def __init__(
         self,
         venv: TaskVecEnv,
-        walker: Callable[[], GaitPolicy] | None = None,
+        gait: tuple[Gait, tuple[float, ...]] | None = None,
         bound: float = 0.0,
     ) -> None:
         """Wraps ``venv``.
 
         Args:
             venv: The tasks.
-            walker: Makes the gait that is corrected; None for none.
+            gait: The gait that is corrected, and its steering per leg [K/rad]; None for none.
             bound: Largest correction [K].
         """
         seen: Any = venv.observation_space
-        if walker is not None:
+        if gait is not None:
             low, high = np.append(seen.low, [-1.0, -1.0]), np.append(seen.high, [1.0, 1.0])
             seen = spaces.Box(low.astype(np.float32), high.astype(np.float32), dtype=np.float32)
         super().__init__(venv, observation_space=seen)
         self.finished: list[dict[str, float]] = []
-        self._walkers = [walker() for _ in range(venv.num_envs)] if walker is not None else []
+        self._walkers: list[GaitPolicy] = []
+        if gait is not None:
+            self._walkers = [GaitPolicy.in_task(task, *gait) for task in venv.tasks.envs]
         self._bound = bound
         self._seen = np.zeros(venv.tasks.observation_space.shape or (), dtype=np.float32)
         self._sums: list[dict[str, float]] = [defaultdict(float) for _ in range(venv.num_envs)]

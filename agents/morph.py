@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -98,3 +99,8 @@ class MorphPolicy:
         action[1] = 2.0 * command.tca_power / MorphModule.max_power - 1.0
         action[2] = 1.0 if command.fan else -1.0
         return action
+
+
+def scripted(task: Any) -> MorphPolicy:
+    """The scripted policy of a ``MorphModule``."""
+    return MorphPolicy(task.module_spec)

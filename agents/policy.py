@@ -24,10 +24,9 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from tca_mj.agents.gait_policy import GaitPolicy
 from tca_mj.agents.network import Network
-from tca_mj.agents.tetrapod_gaits import GaitPolicy
 from tca_mj.control import Gait
-from tca_mj.envs.tetrapod import ACTION, OBSERVATION
 
 FORMAT = 1
 KINDS = {"gait": ".json", "network": ".npz", "residual": ".npz"}
@@ -175,12 +174,12 @@ class SavedPolicy:
             raise ValueError(f"{path} is no policy: {type(error).__name__}: {error}") from error
         return found
 
-    def make(self) -> "Policy":
-        """The policy, ready for an episode."""
+    def make(self, env: Any) -> "Policy":
+        """The policy, ready for an episode in an environment; errors as ``GaitPolicy.in_task``."""
         if self.gait is None:
             assert self.network is not None
             return NetworkPolicy(self.network)
-        walker = GaitPolicy(self.gait, self.steering)
+        walker = GaitPolicy.in_task(env, self.gait, self.steering)
         return walker if self.network is None else ResidualPolicy(walker, self.network, self.bound)
 
 
@@ -251,16 +250,16 @@ def load_policy(source: str | Path, env: Any) -> Policy:
     spec = env.spec
     if spec is not None and spec.id != saved.task:
         raise ValueError(f"{source} is a policy for {saved.task}, not for {spec.id}")
-    given = (env.observation_space.shape[0], env.action_space.shape[0])
-    needed, network = (OBSERVATION.size, ACTION.size), saved.network
+    network = saved.network
     if network is not None:
+        given = (env.observation_space.shape[0], env.action_space.shape[0])
         needed = (network.inputs - (2 if saved.kind == "residual" else 0), network.outputs)
-    if needed != given:
-        raise ValueError(
-            f"{source} turns {needed[0]} numbers into {needed[1]}, the task has"
-            f" {given[0]} and {given[1]}"
-        )
-    return saved.make()
+        if needed != given:
+            raise ValueError(
+                f"{source} turns {needed[0]} numbers into {needed[1]}, the task has"
+                f" {given[0]} and {given[1]}"
+            )
+    return saved.make(env)
 
 
 def find(source: str | Path) -> Path:

@@ -1,6 +1,7 @@
 """The scripted policy of ``TCA/BendReach-v0``: the inverse of the statics, and feedback on it."""
 
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -75,3 +76,8 @@ class ReachPolicy:
         self._body = self._thermostat.heat.body_after(self._body, temperature, self._dt)
         action = 2.0 * power / BendReach.max_power - 1.0
         return np.clip(action, -1.0, 1.0).astype(ACTION.space.dtype)
+
+
+def scripted(task: Any) -> ReachPolicy:
+    """The scripted policy of a ``BendReach``."""
+    return ReachPolicy(task.module_spec)

@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 from stable_baselines3.common.vec_env import VecEnv
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices, VecEnvStepReturn
 
-from tca_mj.envs.base import SimulatedTask
+from tca_mj.envs.task import SimulatedTask
 from tca_mj.envs.vector import TaskVector
+from tca_mj.registry import find_task, task_class
 
 
 class TaskVecEnv(VecEnv):
@@ -42,17 +43,17 @@ class TaskVecEnv(VecEnv):
         """Makes the vector environment, too.
 
         Args:
-            id: Gymnasium id of a task of this package.
+            id: Gymnasium id of a task, or ``module:id``.
             num_envs: Number of tasks.
             **kwargs: Other arguments of ``TaskVector`` and of the task.
 
         Raises:
-            ValueError: If the id is none of this package's, or as ``TaskVector``.
+            ValueError: If the id is of no such task, or as ``TaskVector``.
         """
-        tasks = gym.make_vec(id, num_envs=num_envs, **kwargs)
-        if not isinstance(tasks, TaskVector):
-            raise ValueError(f"id must be one of this package's tasks, got {id}")
-        return cls(tasks)
+        spec = find_task(id)
+        task, limit = task_class(id), kwargs.pop("max_episode_steps", spec.max_episode_steps)
+        given = {**spec.kwargs, **kwargs}
+        return cls(TaskVector(task, num_envs=num_envs, max_episode_steps=limit, **given))
 
     def reset(self) -> NDArray[np.float32]:
         """Begins new episodes with the seeds and options that were set for this once."""

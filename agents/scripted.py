@@ -6,6 +6,7 @@ lift, turn back, bend towards the cup, release.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -287,3 +288,8 @@ class _Seen:
         long_side = float(np.arctan2(2.0 * (x * y + w * z), 1.0 - 2.0 * (y * y + z * z)))
         # The long side has to lie across the fingers; half turns do not matter.
         self.misaligned = (long_side - np.pi / 2.0 - self.yaw + np.pi / 2.0) % np.pi - np.pi / 2.0
+
+
+def scripted(task: Any) -> PickAndPlace:
+    """The scripted policy of an ``ArmPickPlace``."""
+    return PickAndPlace()

@@ -16,21 +16,24 @@ from multiprocessing.process import BaseProcess
 from pathlib import Path
 from typing import Any
 
+import gymnasium as gym
 import numpy as np
 from cmaes import CMA
 from numpy.typing import NDArray
 from tqdm import tqdm
 
+from tca_mj.agents.actors import scripted
+from tca_mj.agents.gait_policy import GaitPolicy
 from tca_mj.agents.gait_score import Headway, Reference, Trial, run_trial, score
 from tca_mj.agents.gait_space import GaitSpace
 from tca_mj.agents.policy import Origin, SavedPolicy, find
 from tca_mj.agents.runs import CURVE, LIBRARIES, RunFolder
-from tca_mj.agents.tetrapod_gaits import GAITS, STEERING, TROT
 from tca_mj.control import Gait
 from tca_mj.machine import versions
+from tca_mj.registry import task_class
 from tca_mj.rod.beam import require_count
 
-TASKS = {f"TCA/Tetrapod{gait.capitalize()}-v0": gait for gait in GAITS}
+TROT = (0.5, 0.0, 0.0, 0.5)  # offsets of four legs, diagonal ones together
 BEST, LAST = "best.json", "last.json"
 
 
@@ -39,7 +42,7 @@ class SearchConfig:
     """Settings of a search.
 
     Attributes:
-        task: Gymnasium id, one of ``TASKS``.
+        task: Gymnasium id of a task with four legs that a gait can drive.
         steps: Control steps of all episodes together after which no generation begins.
         seed: Seed of everything that is drawn.
         start: Where the search begins: ``scripted``, ``trot``, or a policy's file or name.
@@ -58,7 +61,7 @@ class SearchConfig:
         ValueError: If a field is out of range.
     """
 
-    task: str = "TCA/TetrapodWalk-v0"
+    task: str
     steps: int = 150_000
     seed: int = 0
     start: str = "scripted"
@@ -72,8 +75,8 @@ class SearchConfig:
     validation_episodes: int = 8
 
     def __post_init__(self) -> None:
-        if self.task not in TASKS:
-            raise ValueError(f"task must be one of {list(TASKS)}, got {self.task!r}")
+        if task_class(self.task).legs != len(TROT):
+            raise ValueError(f"task must have four legs that a gait can drive, got {self.task!r}")
         require_count(
             steps=self.steps, episodes=self.episodes, validate_every=self.validate_every,
             validation_episodes=self.validation_episodes,
@@ -115,7 +118,7 @@ def first_gait(task: str, start: str) -> tuple[Gait, tuple[float, ...]]:
     """The gait from which something starts, and its steering per leg [K/rad].
 
     Args:
-        task: One of ``TASKS``.
+        task: Gymnasium id.
         start: ``scripted``; ``trot``, which is the same with diagonal legs together, half a cycle
             after the others; or a policy's file or name.
 
@@ -123,12 +126,15 @@ def first_gait(task: str, start: str) -> tuple[Gait, tuple[float, ...]]:
         FileNotFoundError: If ``start`` is no policy.
         ValueError: If it is a policy without a gait.
     """
-    name = TASKS[task]
     if start in ("scripted", "trot"):
-        gait = GAITS[name]
-        if start == "trot":
-            gait = replace(gait, offset=TROT.offset)
-        return gait, (STEERING[name],) * gait.legs
+        env = gym.make(task, disable_env_checker=True)
+        script = scripted(env)
+        env.close()
+        if not isinstance(script, GaitPolicy):
+            raise ValueError(f"start must be a policy with a gait: the script of {task} has none")
+        gait = replace(script.gait, offset=TROT) if start == "trot" else script.gait
+        steering = script.steering
+        return gait, steering if isinstance(steering, tuple) else (steering,) * gait.legs
     saved = SavedPolicy.read(find(start))
     if saved.gait is None:
         raise ValueError(f"start must have a gait, {start} is a {saved.kind}")
@@ -160,7 +166,7 @@ def search(
     """
     require_count(workers=workers)
     gait, steering = first_gait(config.task, config.start)
-    space = GaitSpace(centre=gait)
+    space = GaitSpace(centre=gait, hottest=task_class(config.task).hot_temperature)
     point = space.encode(gait, steering)
     folder = RunFolder(out, config, command)
     optimiser = CMA(
@@ -214,8 +220,7 @@ class _Search:
     ) -> None:
         self.config, self.folder, self.space, self.first = config, folder, space, first
         self.state, self.known, self.command = state, known, command
-        name = TASKS[config.task]
-        self._scripted = GAITS[name], (STEERING[name],) * GAITS[name].legs
+        self._scripted = first_gait(config.task, "scripted")
 
     def prepare(self, trials: "Trials") -> None:
         """Judges the scripted gait and the first one, and what was interrupted."""

@@ -32,7 +32,6 @@ from tca_mj.agents.policy import Origin, Policy, SavedPolicy
 from tca_mj.agents.runs import CURVE, LIBRARIES, RunFolder
 from tca_mj.agents.sb3_env import TaskVecEnv
 from tca_mj.agents.search import first_gait
-from tca_mj.agents.tetrapod_gaits import GaitPolicy
 from tca_mj.envs.wrappers import RecordRerun
 from tca_mj.film import Film
 from tca_mj.machine import versions
@@ -118,9 +117,8 @@ class Run:
         self.evaluations: list[dict[str, float]] = [] if state is None else state["evaluations"]
         self.best: tuple[float, SavedPolicy] | None = None if state is None else state["best"]
         self._gait = first_gait(config.task, config.start) if config.residual else None
-        walker = None if self._gait is None else self._walker
         tasks = TaskVecEnv.make(config.task, config.envs, reset_options=dict(config.options))
-        self.env = LearningEnv(tasks, walker, config.residual)
+        self.env = LearningEnv(tasks, self._gait, config.residual)
         if state is None:
             self.normalise = VecNormalize(self.env, gamma=config.learner.gamma)
             self.model = _learner(config, self.normalise)
@@ -139,10 +137,6 @@ class Run:
         self.test_env: gym.Env[Any, Any] = gym.make(config.task)
         self.board = folder.tensorboard(self.model.num_timesteps)
         self.marks = self.model.num_timesteps // config.interval
-
-    def _walker(self) -> GaitPolicy:
-        assert self._gait is not None
-        return GaitPolicy(*self._gait)
 
     def due(self) -> bool:
         """Whether an interval is over."""
@@ -168,9 +162,8 @@ class Run:
         config, saved = self.config, self.policy()
         random = np.random.default_rng((config.seed, 1))
         seeds = random.integers(2**31, size=config.evaluation_episodes).tolist()
-        found = [
-            episode(self.test_env, saved.make(), seed, dict(config.options)) for seed in seeds
-        ]
+        policy, options = saved.make(self.test_env), dict(config.options)
+        found = [episode(self.test_env, policy, seed, options) for seed in seeds]
         row = {"steps": float(self.model.num_timesteps)}
         row |= {name: float(np.mean([each[name] for each in found])) for name in found[0]}
         self.evaluations.append(row)
@@ -256,7 +249,7 @@ class Run:
                     tqdm.write(f"{VIDEO} is left out: {error}")
 
             options = dict(self.config.options)
-            episode(env, self.best[1].make(), self.config.seed, options, each)
+            episode(env, self.best[1].make(env), self.config.seed, options, each)
         for name in made:
             os.replace(folder / f"part-{name}", folder / name)
 

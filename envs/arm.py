@@ -1,7 +1,6 @@
 """``TCA/ArmPickPlace-v0``: a soft arm lays an object into a cup (Sun, Section 4.1.4)."""
 
 import math
-from collections.abc import Mapping
 from functools import partial
 from typing import Any, ClassVar
 
@@ -11,12 +10,13 @@ from dm_control.utils import rewards
 from numpy.typing import ArrayLike, NDArray
 
 from tca_mj.assets import mjcf
-from tca_mj.envs.base import Observation, Outcome, SimulatedTask, broken_off, heat_of_tcas
-from tca_mj.envs.table import Entry, Table, numbers
+from tca_mj.envs.options import Option, Options, Setup, Uniform, variation_options
+from tca_mj.envs.table import Entry, Table
+from tca_mj.envs.task import SimulatedTask, Verdict
 from tca_mj.envs.vector import TaskVector
 from tca_mj.model.scene import scene
 from tca_mj.robots.arm import ArmSpec, arm
-from tca_mj.sim import Drive, Simulation, SimulationDiverged
+from tca_mj.sim import Drive, Simulation
 
 # Objects, with the width that the gripper has to reach round [m].
 OBJECTS = {"screwdriver": 8e-3, "pcb": 3.6e-3}
@@ -42,7 +42,12 @@ OBSERVATION = Table(
         Entry("cup position", 3, -0.5, 0.5, "m"),
     ]
 )
-ACTION = Table([Entry("TCA power", 5, -1.0, 1.0, "-"), Entry("base velocity", 1, -1.0, 1.0, "-")])
+ACTION = Table(
+    [
+        Entry("TCA power", 5, -1.0, 1.0, "-", off=-1.0),
+        Entry("base velocity", 1, -1.0, 1.0, "-"),
+    ]
+)
 
 _STAND = 25e-3  # height of the objects' centres on their stands [m]
 _LIFTED = 8e-3  # height above the stand at which an object counts as carried [m]
@@ -50,6 +55,10 @@ _PARKED = (0.06, 0.05)  # where the object that is not used stands [m]
 # Turns the gripper's y and z axes, so that a gripper that hangs straight has no rotation.
 _HANGING = np.array([1.0, -1.0, -1.0] * 3)
 _CUP_RADIUS, _CUP_RIM = 12.5e-3, 16e-3  # of assets/mjcf/cup.xml [m]
+
+
+def _draw_object(random: np.random.Generator, setup: Setup) -> str:
+    return list(OBJECTS)[int(random.integers(len(OBJECTS)))]
 
 
 class ArmPickPlace(SimulatedTask):
@@ -78,11 +87,8 @@ class ArmPickPlace(SimulatedTask):
         energy: Minus 0.002 per joule of electrical energy.
 
     Reset: the arm is cold and at rest above the object, which lies on its stand, moved and turned
-    at random, with the cup somewhere on the side to which the arm bends best. Options:
-        object: ``"screwdriver"`` or ``"pcb"``.
-        object_position: x and y on the table, at most 5 mm from below the arm [m].
-        object_yaw: Angle of the object's long side, from world x, in ``yaw_range`` [rad].
-        cup_position: x and y of the cup, at a distance within ``cup_range`` [m].
+    at random, with the cup somewhere on the side to which the arm bends best. ``options`` is the
+    table of all that can be given.
 
     Terminates when the object rests in the cup (success) or has fallen out of reach. Truncates
     after the time limit, and with ``info["truncation_reason"]`` if a TCA is too hot or torn, or if
@@ -96,6 +102,11 @@ class ArmPickPlace(SimulatedTask):
     yaw_range = (np.radians(120.0), np.radians(155.0))
     cup_range = (23e-3, 26.5e-3)  # distance of the cup's axis from the arm's [m]
     cup_angle = np.radians(20.0)  # of the cup's direction about -x
+    terms = ("reach", "carry", "energy", "place")
+    energy_price = 0.002
+    scripted = "tca_mj.agents.scripted:scripted"
+    robot_argument = ("arm_spec", ArmSpec)
+    film_speed = 4.0
 
     def __init__(
         self,
@@ -129,13 +140,50 @@ class ArmPickPlace(SimulatedTask):
         part = scene(
             mjcf("arena.xml"), arm(self.arm_spec), {f: mjcf(f"{f}.xml") for f in files}, name="arm"
         )
-        self.sim = Simulation(part, timestep=timestep, tca_period=5.0 * timestep)
-        self.observation_space = OBSERVATION.space
-        self.action_space = ACTION.space
+        sim = Simulation(part, timestep=timestep, tca_period=5.0 * timestep)
+        self._open(sim, OBSERVATION, ACTION, self._options())
         self.object = "screwdriver"
         self._in_cup, self._carried = 0, False
         self._find(self.model)
-        self._progress, _ = self._judge()
+        self._progress, _ = self._measure()
+
+    def _options(self) -> Options:
+        reach, (near, far) = self.object_range, self.cup_range
+        return Options(
+            [
+                Option(
+                    name="object", about="what is picked up", choices=tuple(OBJECTS), drawn="drawn",
+                    draw=_draw_object,
+                ),
+                Option(
+                    name="object_position", about="x and y on the table, from below the arm",
+                    unit="m", shape=(2,), low=-reach, high=reach, drawn="drawn",
+                    draw=Uniform(-reach, reach, 2),
+                ),
+                Option(
+                    name="object_yaw", about="angle of the object's long side, from world x",
+                    unit="rad", low=self.yaw_range[0], high=self.yaw_range[1], drawn="drawn",
+                    draw=Uniform(*self.yaw_range),
+                ),
+                Option(
+                    name="cup_position", unit="m", shape=(2,), draw=self._draw_cup, drawn="drawn",
+                    about=f"x and y of the cup, {1e3 * near:g} to {1e3 * far:g} mm from the arm's",
+                    check=self._check_cup,
+                ),
+                *variation_options(),
+            ]
+        )  # fmt: skip
+
+    def _draw_cup(self, random: np.random.Generator, setup: Setup) -> NDArray[np.float64]:
+        angle = np.pi + random.uniform(-self.cup_angle, self.cup_angle)
+        return random.uniform(*self.cup_range) * np.array([np.cos(angle), np.sin(angle)])
+
+    def _check_cup(self, place: NDArray[np.float64]) -> None:
+        (near, far), distance = self.cup_range, float(np.hypot(*place))
+        if not near - 1e-9 <= distance <= far + 1e-9:
+            raise ValueError(
+                f"cup_position must be {self.cup_range} m from 0, got {place} at {distance:.4f} m"
+            )
 
     def _find(self, model: mujoco.MjModel) -> None:
         """Looks up the addresses of what is observed and set."""
@@ -152,16 +200,8 @@ class ArmPickPlace(SimulatedTask):
         names = [model.body(int(b)).name for b in model.geom_bodyid]
         self._is_arm = np.array([name.startswith("arm.") for name in names])
 
-    def reset(
-        self, *, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[Observation, dict[str, Any]]:
-        """Starts an episode; see the class for the options.
-
-        Raises:
-            ValueError: If an option is unknown or out of its range.
-        """
-        super().reset(seed=seed)
-        setup = self._setup(options or {})
+    def prepare(self, setup: Setup) -> None:
+        """Puts the arm up, and object and cup where they belong."""
         self.object = setup["object"]
         parked = next(kind for kind in OBJECTS if kind != self.object)
 
@@ -173,49 +213,7 @@ class ArmPickPlace(SimulatedTask):
 
         self.sim.reset(place)
         self._in_cup, self._carried = 0, False
-        self._progress, _ = self._judge()
-        return self._observe(), self._info()
-
-    def _setup(self, options: Mapping[str, Any]) -> dict[str, Any]:
-        """Draws what the options leave open. All draws are made, so that options shift none."""
-        random, reach = self.np_random, self.object_range
-        kind = list(OBJECTS)[int(random.integers(len(OBJECTS)))]
-        position = random.uniform(-reach, reach, 2)
-        yaw = random.uniform(*self.yaw_range)
-        angle = np.pi + random.uniform(-self.cup_angle, self.cup_angle)
-        distance = random.uniform(*self.cup_range)
-        drawn: dict[str, Any] = {
-            "object": kind,
-            "object_position": position,
-            "object_yaw": yaw,
-            "cup_position": distance * np.array([np.cos(angle), np.sin(angle)]),
-        }
-        unknown = [key for key in options if key not in drawn]
-        if unknown:
-            raise ValueError(f"options must be some of {sorted(drawn)}, got {unknown}")
-        setup = drawn | dict(options)
-        if setup["object"] not in list(OBJECTS):
-            raise ValueError(f"object must be one of {sorted(OBJECTS)}, got {setup['object']!r}")
-        for key, shape in (("object_position", (2,)), ("cup_position", (2,)), ("object_yaw", ())):
-            setup[key] = numbers(key, setup[key], shape)
-        if np.abs(setup["object_position"]).max() > reach + 1e-12:
-            raise ValueError(
-                f"object_position must be within {reach} m of 0 in x and y,"
-                f" got {setup['object_position']}"
-            )
-        low, high = self.yaw_range
-        if not low <= setup["object_yaw"] <= high:
-            raise ValueError(
-                f"object_yaw must be between {low:.4f} and {high:.4f} rad,"
-                f" got {setup['object_yaw']}"
-            )
-        distance = float(np.hypot(*setup["cup_position"]))
-        if not self.cup_range[0] - 1e-9 <= distance <= self.cup_range[1] + 1e-9:
-            raise ValueError(
-                f"cup_position must be {self.cup_range} m from 0, got {setup['cup_position']}"
-                f" at {distance:.4f} m"
-            )
-        return setup
+        self._progress, _ = self._measure()
 
     def _place(self, data: mujoco.MjData, kind: str, position: ArrayLike, yaw: float) -> None:
         """Puts an object onto its stand and both where they belong."""
@@ -226,87 +224,55 @@ class ArmPickPlace(SimulatedTask):
         start = self._free_q[kind]
         data.qpos[start : start + 7] = [*pose, *turn]
 
-    def begin(self, command: NDArray[np.float64]) -> Drive:
+    def drive(self, command: NDArray[np.float64]) -> Drive:
         """Power of the TCAs and, at once, velocity of the base; see the class."""
         self.data.ctrl[0] = self.arm_spec.speed * command[5]
         return Drive(power=self.max_power * (command[:5] + 1.0) / 2.0)
 
-    def finish(self, drive: Drive, error: SimulationDiverged | None) -> Outcome:
-        """What the control step has led to; see ``SimulatedTask``."""
-        reason = broken_off(error)
-        self._carried = self._carried or bool(self._position()[2] > _STAND + _LIFTED)
-        observation = self._observe()
-        outside = OBSERVATION.outside(observation)
-        if outside:
-            reason = reason or f"diverged: {', '.join(outside)} out of bounds"
-            observation = OBSERVATION.bounded(observation)
-        before, rests = self._progress, False
-        if reason is None:  # nothing is known of a diverged state
-            self._progress, rests = self._judge()
+    def judge(self, drive: Drive, harmed: bool) -> Verdict:
+        """How near the object is to the gripper and to the cup, and whether it is lost."""
+        before, (self._progress, rests) = self._progress, self._measure()
         terms = {name: value - before[name] for name, value in self._progress.items()}
-        terms["energy"] = -0.002 * float(np.sum(drive.power)) * self.control_period
-        reason = reason or self._damage()
         self._in_cup = self._in_cup + 1 if rests else 0
-        success = self._in_cup >= 3 and reason is None
-        terms["place"] = 20.0 if success else 0.0
+        success = self._in_cup >= 3 and not harmed
         lost = bool(np.hypot(*self._position()[:2]) > 0.2)
-        info = {"reward_terms": terms, "success": success, **self._info()}
-        if reason is not None:
-            info["truncation_reason"] = reason
-        if lost and not success:
-            info["termination_reason"] = "object out of reach"
-        return (
-            observation,
-            float(sum(terms.values())),
-            success or (lost and reason is None),
-            reason is not None,
-            info,
+        return Verdict(
+            terms=terms | {"place": 20.0 if success else 0.0},
+            success=success,
+            ended="object out of reach" if lost and not (success or harmed) else None,
         )
 
     def _position(self) -> NDArray[np.float64]:
         return self.data.xpos[self._body[self.object]]
 
-    def _observe(self) -> Observation:
+    def observe(self) -> dict[str, ArrayLike]:
+        """See ``OBSERVATION``."""
+        self._carried = self._carried or bool(self._position()[2] > _STAND + _LIFTED)
         data, sim = self.data, self.sim
         tips = data.site_xpos[self._tips]
         turn = np.empty(4)
         mujoco.mju_mat2Quat(turn, data.site_xmat[self._grasp] * _HANGING)
         dofs = self._free_v[self.object]
         object_turn = data.xquat[self._body[self.object]]
-        return OBSERVATION.pack(
-            {
-                "base height": data.qpos[self._lift_q],
-                "base velocity": data.qvel[self._lift_v],
-                "TCA temperature": sim.temperature,
-                "TCA length": sim.length,
-                "TCA tension": sim.tension,
-                "gripper opening": np.linalg.norm(tips[1] - tips[0]),
-                "gripper position": data.site_xpos[self._grasp],
-                "gripper orientation": turn if turn[0] >= 0.0 else -turn,
-                "object width": OBJECTS[self.object],
-                "object position": self._position(),
-                "object orientation": object_turn if object_turn[0] >= 0.0 else -object_turn,
-                "object velocity": data.qvel[dofs : dofs + 3],
-                "object angular velocity": data.qvel[dofs + 3 : dofs + 6],
-                "object carried": float(self._carried),
-                "cup position": data.mocap_pos[self._cup],
-            }
-        )
+        return {
+            "base height": data.qpos[self._lift_q],
+            "base velocity": data.qvel[self._lift_v],
+            "TCA temperature": sim.temperature,
+            "TCA length": sim.length,
+            "TCA tension": sim.tension,
+            "gripper opening": np.linalg.norm(tips[1] - tips[0]),
+            "gripper position": data.site_xpos[self._grasp],
+            "gripper orientation": turn if turn[0] >= 0.0 else -turn,
+            "object width": OBJECTS[self.object],
+            "object position": self._position(),
+            "object orientation": object_turn if object_turn[0] >= 0.0 else -object_turn,
+            "object velocity": data.qvel[dofs : dofs + 3],
+            "object angular velocity": data.qvel[dofs + 3 : dofs + 6],
+            "object carried": float(self._carried),
+            "cup position": data.mocap_pos[self._cup],
+        }
 
-    def _damage(self) -> str | None:
-        """Why a TCA does not survive, or None."""
-        sim = self.sim
-        hot = sim.temperature > self.max_temperature
-        if hot.any():
-            name = sim.tca_names[int(np.argmax(hot))]
-            return f"overheated: {name} above {self.max_temperature} °C"
-        torn = sim.tension > sim.bank.breaking_force
-        if torn.any():
-            i = int(np.argmax(torn))
-            return f"torn: {sim.tca_names[i]} above {sim.bank.breaking_force[i]} N"
-        return None
-
-    def _judge(self) -> tuple[dict[str, float], bool]:
+    def _measure(self) -> tuple[dict[str, float], bool]:
         """How far the task has got, by reward term, and whether the object rests in the cup."""
         data = self.data
         position, cup = self._position(), data.mocap_pos[self._cup]
@@ -329,15 +295,21 @@ class ArmPickPlace(SimulatedTask):
         mine = (bodies == self._body[self.object]).any(axis=1)
         return bool((mine & self._is_arm[pairs].any(axis=1)).any())
 
-    def _info(self) -> dict[str, Any]:
-        sim = self.sim
+    def details(self) -> dict[str, Any]:
+        """The object, and whether the arm touches it."""
+        return {"object": self.object, "touched": self._touched()}
+
+    def bent(self) -> float:
+        """Angle of the bending module's tip from straight down [rad]."""
+        down = -float(self.data.site("arm.bending.tip").xmat[8])
+        return float(np.arccos(np.clip(down, -1.0, 1.0)))
+
+    def outcome(self) -> dict[str, Any]:
+        """Where object and cup are [m]."""
         return {
             "object": self.object,
-            "touched": self._touched(),
-            "time": sim.time,
-            "energy": sim.energy.copy(),
-            **heat_of_tcas(sim),
-            "tension": sim.tension.copy(),
+            "object_position": self._position().round(6).tolist(),
+            "cup_position": self.data.mocap_pos[self._cup].round(6).tolist(),
         }
 
 

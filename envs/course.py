@@ -1,23 +1,23 @@
 """``TCA/TetrapodCourse-v0``: under a plate, over a beam, to a target (Sun, Section 6.3.2)."""
 
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from functools import partial
 from typing import Any, ClassVar
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from tca_mj.assets import mjcf
-from tca_mj.envs.base import Observation, Outcome, SimulatedTask, broken_off, heat_of_tcas
+from tca_mj.envs.options import Option, Options, Setup, Uniform, variation_options
 from tca_mj.envs.stance import CAMERAS as FOLLOWING
 from tca_mj.envs.stance import tetrapod_scene
-from tca_mj.envs.table import Entry, Table, numbers
+from tca_mj.envs.table import Entry, Table
+from tca_mj.envs.task import Headway, SimulatedTask, Verdict
 from tca_mj.envs.vector import TaskVector
 from tca_mj.robots.tetrapod import LEGS, SPINES, TetrapodSpec
-from tca_mj.sim import Drive, SimulationDiverged
+from tca_mj.sim import Drive
 from tca_mj.smp import HeaterSpec, SpineSpec
-from tca_mj.variation import Nominal, Variation
 
 CAMERAS = (*FOLLOWING, "overview")
 TCAS = 3 * len(LEGS) + SPINES
@@ -37,8 +37,8 @@ OBSERVATION = Table(
 )
 ACTION = Table(
     [
-        Entry("TCA power", TCAS, -1.0, 1.0, "-"),
-        Entry("heater voltage", SPINES, -1.0, 1.0, "-"),
+        Entry("TCA power", TCAS, -1.0, 1.0, "-", off=-1.0),
+        Entry("heater voltage", SPINES, -1.0, 1.0, "-", off=-1.0),
     ]
 )
 
@@ -77,6 +77,30 @@ class Places:
     leg_station: float
 
 
+def _default() -> TetrapodSpec:
+    return TetrapodSpec(spine=LIFTING_SPINE, heater=HeaterSpec.fitted(LIFTING_SPINE))
+
+
+def _draw_yaw(random: np.random.Generator, setup: Setup) -> float:
+    return float(random.uniform(-1.0, 1.0) * np.radians(2.0))
+
+
+_OPTIONS = Options(
+    [
+        Option(
+            name="position", about="x and y of its middle", unit="m", shape=(2,), low=-5e-3,
+            high=5e-3, draw=Uniform(-5e-3, 5e-3, 2), drawn="drawn",
+        ),
+        Option(
+            name="yaw", about="heading", unit="rad", low=-np.radians(3.0), high=np.radians(3.0),
+            draw=_draw_yaw,
+            drawn="drawn, within 2°",
+        ),
+        *variation_options(),
+    ]
+)  # fmt: skip
+
+
 class TetrapodCourse(SimulatedTask):
     """The whole course with one robot that changes its shape on the way.
 
@@ -99,13 +123,8 @@ class TetrapodCourse(SimulatedTask):
         finish: 20 when the robot lies flat and rigid on the target, all of its body on it.
         energy: Minus 1e-5 per joule.
 
-    Reset: cold, flat and at rest before the plate, moved and turned a little at random. Options:
-        position: x and y of its middle, at most 5 mm from 0 [m].
-        yaw: Heading, at most 3° [rad].
-        friction, mass, tca_gain, heat_loss, ambient: The fields of ``tca_mj.variation.Variation``;
-            friction 0.5 to 1.5.
-        randomise: Spread with which friction is drawn if it is not given, 0 to 0.5; by default 0.
-        randomise_robot: The same for the other fields.
+    Reset: cold, flat and at rest before the plate, moved and turned a little at random. ``options``
+    is the table of all that can be given.
 
     Terminates at the finish, which is a success if nothing was touched or damaged, or when the
     robot has fallen. Truncates after the time limit, and with ``info["truncation_reason"]`` if a
@@ -116,6 +135,12 @@ class TetrapodCourse(SimulatedTask):
     max_voltage = 25.0  # Sun, Section 6.1.3 [V]
     max_temperature = 180.0  # annealing temperature of the TCAs, Sun, Table 2.1 [°C]
     control_period = 0.1  # [s]
+    terms = ("progress", "touch", "damage", "finish", "energy")
+    energy_price = 1e-5
+    scripted = "tca_mj.agents.course:CourseWalker"
+    robot_argument = ("robot", _default)
+    film_speed = 30.0
+    published_speed = {"crawl": 2.4e-3, "walk": 9e-3, "shimmy": 0.75e-3}  # Sun, Section 6.3.2 [m/s]
 
     def __init__(
         self,
@@ -147,22 +172,18 @@ class TetrapodCourse(SimulatedTask):
                 f"tca_period must divide the control period {self.control_period} s,"
                 f" got {tca_period}"
             )
-        self.robot = robot or TetrapodSpec(
-            spine=LIFTING_SPINE, heater=HeaterSpec.fitted(LIFTING_SPINE)
-        )
-        self.sim = tetrapod_scene(
+        self.robot = robot or _default()
+        sim = tetrapod_scene(
             mjcf("course.xml"), {}, self.robot, timestep=timestep, period=tca_period
         )
-        self.observation_space = OBSERVATION.space
-        self.action_space = ACTION.space
-        self._nominal = Nominal(self.sim)
+        self._open(sim, OBSERVATION, ACTION, _OPTIONS)
         self._find(self.model)
         self.touched = False
-        self._x = 0.0
-        self._before = 0.0, 0  # energy used and spines harmed before the step
+        self._x, self._harmed = 0.0, 0
 
     def _find(self, model: mujoco.MjModel) -> None:
         """Looks up the addresses of what is observed and judged."""
+        self._hub = int(model.body("robot.hub").id)
         self._root = int(model.jnt_qposadr[model.joint("robot.root").id])
         bends = [
             (model.joint(f"robot.{side}.bend_x{i}").qposadr[0], sign)
@@ -198,109 +219,40 @@ class TetrapodCourse(SimulatedTask):
         """Bend of the body from rail to rail [rad]."""
         return float(self.data.qpos[self._bends] @ self._signs)
 
-    def reset(
-        self, *, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[Observation, dict[str, Any]]:
-        """Starts an episode; see the class for the options.
-
-        Raises:
-            ValueError: If an option is unknown or out of its range.
-        """
-        super().reset(seed=seed)
-        setup = self._drawn(options or {})
-        self._nominal.apply(setup["variation"])
+    def prepare(self, setup: Setup) -> None:
+        """Lays the robot before the plate."""
 
         def place(data: mujoco.MjData) -> None:
             turn = [np.cos(setup["yaw"] / 2.0), 0.0, 0.0, np.sin(setup["yaw"] / 2.0)]
             data.qpos[self._root : self._root + 7] = [*setup["position"], _START, *turn]
 
         self.sim.reset(place)
-        self.touched = False
+        self.touched, self._harmed = False, 0
         self._x = float(self.position[0])
-        return self._observe(), self._info()
 
-    def _drawn(self, options: dict[str, Any]) -> dict[str, Any]:
-        """Draws what the options leave open. All draws are made, so that options shift none."""
-        random = self.np_random
-        drawn: dict[str, Any] = {
-            "position": random.uniform(-5e-3, 5e-3, 2),
-            "yaw": random.uniform(-1.0, 1.0) * np.radians(2.0),
-            "friction": 1.0,
-            "randomise": 0.0,
-            "randomise_robot": 0.0,
-        }
-        draws = random.uniform(-1.0, 1.0, len(Variation.names())).tolist()
-        known = [*drawn, *Variation.names()[1:]]
-        unknown = [key for key in options if key not in known]
-        if unknown:
-            raise ValueError(f"options must be some of {sorted(known)}, got {unknown}")
-        setup = drawn | dict(options)
-        for key, shape, low, high in (
-            ("position", (2,), -5e-3, 5e-3),
-            ("yaw", (), -np.radians(3.0), np.radians(3.0)),
-            ("friction", (), 0.5, 1.5),
-            ("randomise", (), 0.0, 0.5),
-            ("randomise_robot", (), 0.0, 0.5),
-        ):
-            value = numbers(key, setup[key], shape)
-            if value.min() < low - 1e-12 or value.max() > high + 1e-12:
-                raise ValueError(f"{key} must be between {low:g} and {high:g}, got {setup[key]}")
-            setup[key] = value
-        given = {
-            name: float(numbers(name, setup[name], ()))
-            for name in Variation.names()
-            if name in options
-        }
-        varied = asdict(Variation.drawn(draws, float(setup["randomise_robot"])))
-        varied["friction"] = 1.0 + float(setup["randomise"]) * draws[0]
-        return setup | {"variation": Variation(**(varied | given))}
-
-    def begin(self, command: NDArray[np.float64]) -> Drive:
+    def drive(self, command: NDArray[np.float64]) -> Drive:
         """Power of the TCAs and voltage of the heaters; see the class."""
         share = (command + 1.0) / 2.0
-        self._before = self.energy, int(self.sim.spines.damaged.sum())
         return Drive(power=self.max_power * share[:TCAS], voltage=self.max_voltage * share[TCAS:])
 
-    def finish(self, drive: Drive, error: SimulationDiverged | None) -> Outcome:
-        """What the control step has led to; see ``SimulatedTask``."""
-        reason = broken_off(error)
-        observation = self._observe()
-        outside = OBSERVATION.outside(observation)
-        if outside:
-            reason = reason or f"diverged: {', '.join(outside)} out of bounds"
-            observation = OBSERVATION.bounded(observation)
-        reason = reason or self._damage()
-        used, harmed = self._before
-        terms = dict.fromkeys(("progress", "touch", "damage", "finish", "energy"), 0.0)
-        finished = fallen = False
-        if reason is None:  # nothing is known of a diverged state
-            x = float(self.position[0])
-            terms["progress"], self._x = 10.0 * (x - self._x), x
-            touches = self._touches()
-            self.touched = self.touched or touches
-            finished, fallen = self._finished(), self._fallen()
-            terms["touch"] = -0.1 if touches else 0.0
-            terms["damage"] = -5.0 * (int(self.sim.spines.damaged.sum()) - harmed)
-            terms["finish"] = 20.0 if finished else 0.0
-            terms["energy"] = -1e-5 * (self.energy - used)
-        unharmed = not (self.touched or self.sim.spines.damaged.any())
-        info = {"reward_terms": terms, "success": finished and unharmed, **self._info()}
-        if reason is not None:
-            info["truncation_reason"] = reason
-        if fallen:
-            info["termination_reason"] = "fallen"
-        return (
-            observation,
-            float(sum(terms.values())),
-            finished or fallen,
-            reason is not None,
-            info,
-        )
-
-    @property
-    def energy(self) -> float:
-        """Electrical energy put into TCAs and heaters since the reset [J]."""
-        return float(self.sim.energy.sum() + self.sim.spines.energy.sum())
+    def judge(self, drive: Drive, harmed: bool) -> Verdict:
+        """Headway, what was touched and damaged, and whether the robot lies on the target."""
+        x, touches = float(self.position[0]), self._touches()
+        headway, self._x = x - self._x, x
+        self.touched = self.touched or touches
+        before, self._harmed = self._harmed, int(self.sim.spines.damaged.sum())
+        finished = self._finished() and not harmed
+        unharmed = not (self.touched or self._harmed)
+        terms = {
+            "progress": 10.0 * headway,
+            "touch": -0.1 if touches else 0.0,
+            "damage": -5.0 * (self._harmed - before),
+            "finish": 20.0 if finished else 0.0,
+        }
+        ended = "fallen" if self._fallen() else None
+        if finished and not unharmed:
+            ended = "finished, but something was touched or damaged"
+        return Verdict(terms=terms, success=finished and unharmed, ended=ended)
 
     def _touches(self) -> bool:
         """Whether the robot touches the plate or its posts."""
@@ -323,46 +275,48 @@ class TetrapodCourse(SimulatedTask):
         _, x, y, _ = self.data.qpos[self._root + 3 : self._root + 7]
         return bool(1.0 - 2.0 * (x * x + y * y) < _TURNED or self.position[2] < _LOST)
 
-    def _damage(self) -> str | None:
-        sim = self.sim
-        if sim.temperature.max() > self.max_temperature:
-            name = sim.tca_names[int(sim.temperature.argmax())]
-            return f"{name} is above {self.max_temperature:g} °C"
-        if (sim.tension > sim.bank.breaking_force).any():
-            return "a TCA is torn"
-        return None
-
-    def _observe(self) -> Observation:
+    def observe(self) -> dict[str, ArrayLike]:
+        """See ``OBSERVATION``."""
         data, sim = self.data, self.sim
         start = self._root
         turn = data.qpos[start + 3 : start + 7]
         dof = int(self.model.jnt_dofadr[self.model.joint("robot.root").id])
-        return OBSERVATION.pack(
-            {
-                "TCA temperature": sim.temperature,
-                "TCA length": sim.length,
-                "TCA tension": sim.tension,
-                "spine temperature": sim.spines.temperature,
-                "body angle": self.body_angle,
-                "position": self.position,
-                "orientation": turn if turn[0] >= 0.0 else -turn,
-                "velocity": data.qvel[dof : dof + 3],
-                "angular velocity": data.qvel[dof + 3 : dof + 6],
-            }
-        )
-
-    def _info(self) -> dict[str, Any]:
-        sim = self.sim
         return {
-            "energy": self.energy,
-            "tca_energy": dict(zip(sim.tca_names, sim.energy.tolist(), strict=True)),
-            "heater_energy": dict(zip(sim.spines.names, sim.spines.energy.tolist(), strict=True)),
-            **heat_of_tcas(sim),
+            "TCA temperature": sim.temperature,
+            "TCA length": sim.length,
+            "TCA tension": sim.tension,
+            "spine temperature": sim.spines.temperature,
+            "body angle": self.body_angle,
+            "position": self.position,
+            "orientation": turn if turn[0] >= 0.0 else -turn,
+            "velocity": data.qvel[dof : dof + 3],
+            "angular velocity": data.qvel[dof + 3 : dof + 6],
+        }
+
+    def details(self) -> dict[str, Any]:
+        """What was touched, the body's angle [rad] and the place of its middle [m]."""
+        return {
             "touched_plate": self.touched,
-            "damaged": sim.spines.damaged.copy(),
             "body_angle": self.body_angle,
             "position": self.position.copy(),
-            "variation": asdict(self._nominal.variation),
+        }
+
+    def bent(self) -> float:
+        """See ``body_angle``."""
+        return self.body_angle
+
+    def headway(self) -> Headway:
+        """Along the course, from its beginning."""
+        x, y, _ = self.position.tolist()
+        weight = 9.81 * float(self.model.body_subtreemass[self._hub])
+        return Headway(along=x, aside=y, weight=weight)
+
+    def outcome(self) -> dict[str, Any]:
+        """Friction, and what was touched or damaged."""
+        return {
+            "friction": round(self.variation.friction, 6),
+            "touched_plate": self.touched,
+            "damaged": bool(self.sim.spines.damaged.any()),
         }
 
 

@@ -1,24 +1,24 @@
 """``TCA/MorphModule-v0``: a module bends itself to an angle and keeps it (Sun, Section 6.1)."""
 
 import math
-from collections.abc import Mapping
 from functools import partial
 from typing import Any
 
 import mujoco
 import numpy as np
 from dm_control.utils import rewards
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from tca_mj.assets import mjcf
-from tca_mj.envs.base import Observation, Outcome, SimulatedTask, broken_off, heat_of_tcas
-from tca_mj.envs.table import Entry, Table, numbers
+from tca_mj.envs.options import Option, Options, Setup, Uniform, variation_options
+from tca_mj.envs.table import Entry, Table
+from tca_mj.envs.task import SimulatedTask, Verdict
 from tca_mj.envs.vector import TaskVector
 from tca_mj.model.part import Part, new_spec
 from tca_mj.model.scene import scene
 from tca_mj.modules.morphing import MorphingSpec, morphing_module
 from tca_mj.render import colour_tendons
-from tca_mj.sim import Drive, Simulation, SimulationDiverged
+from tca_mj.sim import Drive, Simulation
 
 CAMERAS = ("front", "side")
 
@@ -37,8 +37,8 @@ OBSERVATION = Table(
 )
 ACTION = Table(
     [
-        Entry("heater voltage", 1, -1.0, 1.0, "-"),
-        Entry("TCA power", 1, -1.0, 1.0, "-"),
+        Entry("heater voltage", 1, -1.0, 1.0, "-", off=-1.0),
+        Entry("TCA power", 1, -1.0, 1.0, "-", off=-1.0),
         Entry("fan", 1, -1.0, 1.0, "on above 0"),
     ]
 )
@@ -48,6 +48,10 @@ _CLAMP = (-0.03, 0.0, 0.162)  # where the module hangs [m]
 _HANGING = (0.0, math.sqrt(0.5), -math.sqrt(0.5), 0.0)
 _COLD, _HOT = np.array([0.86, 0.74, 0.48]), np.array([0.90, 0.25, 0.12])  # of the spine
 _APART = math.radians(20.0)  # least distance of a drawn start from the goal [rad]
+
+
+def _default() -> MorphingSpec:
+    return MorphingSpec(motions=("bend_x",))
 
 
 class MorphModule(SimulatedTask):
@@ -77,9 +81,8 @@ class MorphModule(SimulatedTask):
     At the goal the module is within 3° of the commanded angle, its spine is rigid (below 80 °C),
     and heater, TCA and fan are off.
 
-    Reset: cold and fixed in some angle, to be fixed in another one. Options:
-        start: Angle at the start, in ``start_range`` [rad].
-        target: Angle to fix, in ``target_range`` [rad].
+    Reset: cold and fixed in some angle, to be fixed in another one. ``options`` is the table of all
+    that can be given.
 
     Terminates at the goal (success). Truncates after the time limit, and with
     ``info["truncation_reason"]`` if the TCA is damaged, too hot or torn, the spine too hot, or if
@@ -95,6 +98,10 @@ class MorphModule(SimulatedTask):
     hold_time = 3.0  # time at the goal [s]
     start_range = (0.0, math.pi)
     target_range = (math.radians(30.0), math.pi)
+    terms = ("reach", "fix", "goal", "energy", "damage")
+    energy_price = 0.01
+    scripted = "tca_mj.agents.morph:scripted"
+    robot_argument = ("module_spec", _default)
 
     def __init__(
         self,
@@ -124,15 +131,39 @@ class MorphModule(SimulatedTask):
             raise ValueError(
                 f"timestep must be {self.control_period} s over a whole number, got {timestep}"
             )
-        self.module_spec = module_spec or MorphingSpec(motions=("bend_x",))
+        self.module_spec = module_spec or _default()
         part = hanging_module(self.module_spec)
-        self.sim = Simulation(part, timestep=timestep, tca_period=self.control_period)
-        self.observation_space = OBSERVATION.space
-        self.action_space = ACTION.space
+        sim = Simulation(part, timestep=timestep, tca_period=self.control_period)
+        self._open(sim, OBSERVATION, ACTION, self._options())
         self.target = self.target_range[1]
-        self._at_goal, self._used = 0, 0.0
+        self._at_goal = 0
         self._find(self.model, part)
-        self._progress = self._judge()
+        self._progress = self._measure()
+
+    def _options(self) -> Options:
+        return Options(
+            [
+                Option(
+                    name="target", about="angle to fix", unit="rad",
+                    low=self.target_range[0], high=self.target_range[1], drawn="drawn",
+                    draw=Uniform(*self.target_range),
+                ),
+                Option(
+                    name="start", about="angle at the start", unit="rad",
+                    low=self.start_range[0], high=self.start_range[1], draw=self._draw_start,
+                    drawn="drawn, not near the target",
+                ),
+                *variation_options(),
+            ]
+        )  # fmt: skip
+
+    def _draw_start(self, random: np.random.Generator, setup: Setup) -> float:
+        """Anywhere but near the goal."""
+        (low, high), target, share = self.start_range, setup["target"], random.random()
+        below = max(target - _APART - low, 0.0)
+        above = max(high - target - _APART, 0.0)
+        along = share * (below + above)
+        return float(low + along if along < below else high - (below + above - along))
 
     def _find(self, model: mujoco.MjModel, part: Part) -> None:
         """Looks up the addresses of what is observed and set."""
@@ -155,16 +186,8 @@ class MorphModule(SimulatedTask):
         assert spines.state is not None
         return float(np.sum(spines.bank.spring(spines.state).reference[self._bends]))
 
-    def reset(
-        self, *, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[Observation, dict[str, Any]]:
-        """Starts an episode; see the class for the options.
-
-        Raises:
-            ValueError: If an option is unknown or out of its range.
-        """
-        super().reset(seed=seed)
-        setup = self._setup(options or {})
+    def prepare(self, setup: Setup) -> None:
+        """Bends the cold module to where it starts."""
         self.target = setup["target"]
 
         def place(data: mujoco.MjData) -> None:
@@ -172,76 +195,37 @@ class MorphModule(SimulatedTask):
 
         self.sim.reset(place)
         self._at_goal = 0
-        self._progress = self._judge()
-        return self._observe(), self._info()
+        self._progress = self._measure()
 
-    def _setup(self, options: Mapping[str, Any]) -> dict[str, float]:
-        """Draws what the options leave open. All draws are made, so that options shift none."""
-        ranges = {"target": self.target_range, "start": self.start_range}
-        unknown = [key for key in options if key not in ranges]
-        if unknown:
-            raise ValueError(f"options must be some of {sorted(ranges)}, got {unknown}")
-        setup = {"target": float(self.np_random.uniform(*self.target_range))}
-        share = self.np_random.random()
-        for key, (low, high) in ranges.items():
-            if key not in options:
-                continue
-            value = float(numbers(key, options[key], ()))
-            if not low <= value <= high:
-                raise ValueError(f"{key} must be between {low:.4f} and {high:.4f} rad, got {value}")
-            setup[key] = value
-        if "start" not in setup:  # anywhere but near the goal
-            low, high = self.start_range
-            below = max(setup["target"] - _APART - low, 0.0)
-            above = max(high - setup["target"] - _APART, 0.0)
-            along = share * (below + above)
-            setup["start"] = low + along if along < below else high - (below + above - along)
-        return setup
-
-    def begin(self, command: NDArray[np.float64]) -> Drive:
+    def drive(self, command: NDArray[np.float64]) -> Drive:
         """Voltage of the heater, power of the TCA, and the fan; see the class."""
         share = (command + 1.0) / 2.0
-        self._used = self._energy()
         return Drive(
             power=self.max_power * share[1:2],
             voltage=self.max_voltage * share[0],
             fan=bool(command[2] > 0.0),
         )
 
-    def finish(self, drive: Drive, error: SimulationDiverged | None) -> Outcome:
-        """What the control step has led to; see ``SimulatedTask``."""
-        reason = broken_off(error)
+    def judge(self, drive: Drive, harmed: bool) -> Verdict:
+        """How near the goal is, and how long the module has been there."""
         off = not (drive.power.any() or drive.voltage or drive.fan)
-        before = self._progress
-        if reason is None:  # nothing is known of a diverged state
-            self._progress = self._judge()
-        self._at_goal = self._at_goal + 1 if off and reason is None and self._fixed() else 0
-        observation = self._observe()
-        outside = OBSERVATION.outside(observation)
-        if outside:
-            reason = reason or f"diverged: {', '.join(outside)} out of bounds"
-            observation = OBSERVATION.bounded(observation)
-        reason = reason or self._harm()
-        success = self._at_goal * self.control_period > self.hold_time - 1e-9 and reason is None
+        before, self._progress = self._progress, self._measure()
+        self._at_goal = self._at_goal + 1 if off and self._fixed() else 0
+        held = self._at_goal * self.control_period
+        success = held > self.hold_time - 1e-9 and not harmed
         terms = {name: value - before[name] for name, value in self._progress.items()}
         terms["goal"] = 20.0 if success else 0.0
-        terms["energy"] = -0.01 * (self._energy() - self._used)
-        terms["damage"] = -10.0 if reason is not None and reason.startswith("damaged") else 0.0
-        info = {"reward_terms": terms, "success": success, **self._info()}
-        if reason is not None:
-            info["truncation_reason"] = reason
-        return observation, float(sum(terms.values())), success, reason is not None, info
-
-    def _energy(self) -> float:
-        """Electrical energy put into heater and TCA [J]."""
-        return float(self.sim.energy.sum() + self.sim.spines.energy.sum())
+        terms["damage"] = -10.0 if self.sim.spines.damaged.any() else 0.0
+        return Verdict(
+            terms=terms, success=success, seen={"time at the goal": min(held, self.hold_time)}
+        )
 
     def _fixed(self) -> bool:
         """Whether the angle is the commanded one and the spine rigid."""
         rigid = self.sim.spines.temperature[0] < self.module_spec.spine.smp.rigid_below
         return bool(rigid and abs(self.angle - self.target) <= self.tolerance)
 
-    def _judge(self) -> dict[str, float]:
+    def _measure(self) -> dict[str, float]:
         """How far the task has got, by reward term."""
 
         def near(angle: float) -> float:
@@ -255,54 +239,41 @@ class MorphModule(SimulatedTask):
         self._keeps = self.fixed_angle
         return {"reach": near(self.angle), "fix": 4.0 * near(self._keeps)}
 
-    def _observe(self) -> Observation:
+    def observe(self) -> dict[str, ArrayLike]:
+        """See ``OBSERVATION``."""
         sim = self.sim
         length = sim.length
         try:
             resistance = sim.bank.resistance(sim.tca, length)
         except ValueError:  # a diverged TCA has a length that no TCA can have
             resistance = np.full(1, np.nan)
-        return OBSERVATION.pack(
-            {
-                "spine temperature": sim.spines.temperature,
-                "TCA temperature": sim.temperature,
-                "TCA length": length,
-                "TCA resistance": resistance,
-                "TCA tension": sim.tension,
-                "angle": self.angle,
-                "angular velocity": float(np.sum(self.data.qvel[self._bend_v])),
-                "commanded angle": self.target,
-                "time at the goal": min(self._at_goal * self.control_period, self.hold_time),
-            }
-        )
-
-    def _harm(self) -> str | None:
-        """What the module does not survive, or None."""
-        sim = self.sim
-        if sim.spines.damaged.any():
-            return "damaged: the TCA contracted against a stiff spine"
-        if sim.spines.temperature[0] > self.max_spine_temperature:
-            return f"overheated: spine above {self.max_spine_temperature} °C"
-        if sim.temperature[0] > self.max_temperature:
-            return f"overheated: TCA above {self.max_temperature} °C"
-        if sim.tension[0] > sim.bank.breaking_force[0]:
-            return f"torn: TCA above {sim.bank.breaking_force[0]} N"
-        return None
-
-    def _info(self) -> dict[str, Any]:
-        sim = self.sim
         return {
-            "target": self.target,
+            "spine temperature": sim.spines.temperature,
+            "TCA temperature": sim.temperature,
+            "TCA length": length,
+            "TCA resistance": resistance,
+            "TCA tension": sim.tension,
             "angle": self.angle,
-            "fixed_angle": self._keeps,
-            "time": sim.time,
-            "energy": sim.energy.copy(),
-            "heater_energy": sim.spines.energy.copy(),
-            **heat_of_tcas(sim),
-            "spine_temperature": sim.spines.temperature.copy(),
-            "tension": sim.tension.copy(),
-            "damaged": bool(sim.spines.damaged.any()),
+            "angular velocity": float(np.sum(self.data.qvel[self._bend_v])),
+            "commanded angle": self.target,
+            "time at the goal": min(self._at_goal * self.control_period, self.hold_time),
         }
+
+    def harm(self) -> str | None:
+        """What the module does not survive, or None."""
+        if self.sim.spines.damaged.any():
+            return "damaged: the TCA contracted against a stiff spine"
+        if self.sim.spines.temperature[0] > self.max_spine_temperature:
+            return f"overheated: spine above {self.max_spine_temperature} °C"
+        return super().harm()
+
+    def details(self) -> dict[str, Any]:
+        """The commanded, the present and the fixed angle [rad]."""
+        return {"target": self.target, "angle": self.angle, "fixed_angle": self._keeps}
+
+    def bent(self) -> float:
+        """See ``angle``."""
+        return self.angle
 
     def paint(self) -> None:
         """Gives TCA and spine the colours of their temperatures; no physics reads them."""

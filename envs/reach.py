@@ -1,21 +1,19 @@
 """``TCA/BendReach-v0``: three TCAs bring the tip of a soft module to a point (Sun, 4.1.3)."""
 
-from collections.abc import Mapping
-from dataclasses import asdict
 from functools import partial
 from typing import Any, ClassVar
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from tca_mj.envs.base import Observation, Outcome, SimulatedTask, broken_off, heat_of_tcas
 from tca_mj.envs.hanging import CLAMP, PERIOD, TCAS, NoRest, StaticTip
-from tca_mj.envs.table import Entry, Table, numbers
+from tca_mj.envs.options import Constant, Option, Options, Setup, variation_options
+from tca_mj.envs.table import Entry, Table
+from tca_mj.envs.task import SimulatedTask, Verdict
 from tca_mj.envs.vector import TaskVector
 from tca_mj.modules.bending import BendingSpec
 from tca_mj.sim import Drive, SimulationDiverged
-from tca_mj.variation import Nominal, Variation
 
 CAMERAS = ("front", "side")
 
@@ -30,13 +28,34 @@ OBSERVATION = Table(
         Entry("time at the target", 1, 0.0, 1.0, "s"),
     ]
 )
-ACTION = Table([Entry("TCA power", TCAS, -1.0, 1.0, "-")])
+ACTION = Table([Entry("TCA power", TCAS, -1.0, 1.0, "-", off=-1.0)])
 
 _SETTLING = 0.5  # time in which the cold module comes to rest [s]
 _SHRINK = 0.8  # rise of temperature is cut to this share until the module comes to rest
 _NEAR = 1e-4  # how near to a given target the module has to rest [m]
 _SUPPLY = 0.9  # share of the largest power that is enough to stay at a target
 _COLDER, _COLDEST = 1.0, 0.75  # largest rise of the other two TCAs over that of the hottest
+
+
+def _rise(random: np.random.Generator, setup: Setup) -> NDArray[np.float64]:
+    most = random.uniform(0.5, 1.0)
+    shares = [1.0, random.uniform(0.0, _COLDER), random.uniform(0.0, _COLDEST)]
+    return (most * np.array(shares))[random.permutation(TCAS)]
+
+
+_OPTIONS = Options(
+    [
+        Option(
+            name="rise", shape=(TCAS,), low=0.0, high=1.0, draw=_rise, drawn="drawn",
+            about="rise of the TCAs' temperatures at the target over the largest",
+        ),
+        Option(
+            name="target", about="the target, from the clamp, instead", unit="m", shape=(3,),
+            draw=Constant(None), drawn="where the tip rests at that rise",
+        ),
+        *variation_options(),
+    ]
+)  # fmt: skip
 
 
 class BendReach(SimulatedTask):
@@ -60,12 +79,8 @@ class BendReach(SimulatedTask):
 
     Reset: cold and at rest. The target is where the tip of this very module rests while its TCAs
     have temperatures that are drawn between that of the surroundings and ``hottest_target``, or
-    what 90 % of the power can keep: it can be reached, and kept. Options:
-        target: The target, from the clamp, shape (3,) [m]. Refused if the module cannot rest there.
-        friction, mass, tca_gain, heat_loss, ambient: The fields of ``tca_mj.variation.Variation``.
-            Nothing touches the module: friction changes nothing.
-        randomise: Spread with which those of them are drawn that are not given; 0.2 is 20 % and
-            5 K. By default 0.
+    what 90 % of the power can keep: it can be reached, and kept. A target that is given is refused
+    if the module cannot rest there. ``options`` is the table of all that can be given.
 
     Terminates at the goal (success). Truncates after the time limit, and with
     ``info["truncation_reason"]`` if a TCA is too hot or torn, or if the simulation diverged.
@@ -78,6 +93,11 @@ class BendReach(SimulatedTask):
     control_period: ClassVar[float] = PERIOD  # [s]
     tolerance: ClassVar[float] = 3e-3  # [m]
     hold_time: ClassVar[float] = 1.0  # time at the target [s]
+    terms = ("reach", "goal", "energy", "heat", "end")
+    energy_price, heat_price, end_price = 0.02, 0.002, 5.0
+    scripted = "tca_mj.agents.reach:scripted"
+    robot_argument = ("module_spec", BendingSpec)
+    learning_steps = {"ppo": 60_000, "sac": 60_000}
 
     def __init__(
         self,
@@ -103,32 +123,15 @@ class BendReach(SimulatedTask):
         self._look(render_mode, camera, size, cameras=CAMERAS, prefix="stand.")
         self.module_spec = module_spec or BendingSpec()
         self.static = StaticTip(self.module_spec, timestep=timestep)
-        self.sim = self.static.sim
-        self.observation_space = OBSERVATION.space
-        self.action_space = ACTION.space
-        self._nominal = Nominal(self.sim)
+        self._open(self.static.sim, OBSERVATION, ACTION, _OPTIONS)
         self._mocap = int(self.model.body("stand.target").mocapid[0])
         self.target = np.zeros(3)
         self.target_temperature = self.sim.temperature.copy()
         self._at_target = 0
         self._distance = self._gap()
 
-    @property
-    def variation(self) -> Variation:
-        """How far the module of this episode is off."""
-        return self._nominal.variation
-
-    def reset(
-        self, *, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[Observation, dict[str, Any]]:
-        """Starts an episode; see the class for the options.
-
-        Raises:
-            ValueError: If an option is unknown or out of its range.
-        """
-        super().reset(seed=seed)
-        setup = self._setup(options or {})
-        self._nominal.apply(setup["variation"])
+    def prepare(self, setup: Setup) -> None:
+        """Finds the target; then the cold module comes to rest."""
         if setup["target"] is None:
             self.target, self.target_temperature = self._drawn_target(setup["rise"])
         else:
@@ -142,29 +145,6 @@ class BendReach(SimulatedTask):
         mujoco.mj_forward(self.model, self.data)
         self._at_target = 0
         self._distance = self._gap()
-        return self._observe(), self._info()
-
-    def _setup(self, options: Mapping[str, Any]) -> dict[str, Any]:
-        """Draws what the options leave open. All draws are made, so that options shift none."""
-        random = self.np_random
-        rise = random.uniform(0.5, 1.0) * np.array(
-            [1.0, random.uniform(0.0, _COLDER), random.uniform(0.0, _COLDEST)]
-        )
-        rise = rise[random.permutation(TCAS)]
-        draws = random.uniform(-1.0, 1.0, len(Variation.names()))
-        known = ["target", "randomise", *Variation.names()]
-        unknown = [key for key in options if key not in known]
-        if unknown:
-            raise ValueError(f"options must be some of {sorted(known)}, got {unknown}")
-        given = {key: numbers(key, value, (3,) if key == "target" else ())
-                 for key, value in options.items()}  # fmt: skip
-        target = given.pop("target", None)
-        spread = float(given.pop("randomise", 0.0))
-        if not 0.0 <= spread <= 0.5:
-            raise ValueError(f"randomise must be between 0 and 0.5, got {spread}")
-        varied = asdict(Variation.drawn(draws.tolist(), spread))
-        told = {key: float(value) for key, value in given.items()}
-        return {"rise": rise, "target": target, "variation": Variation(**(varied | told))}
 
     def _drawn_target(
         self, rise: NDArray[np.float64]
@@ -198,41 +178,23 @@ class BendReach(SimulatedTask):
         kept = heat.ambient + _SUPPLY * self.max_power / (heat.loss + heat.conductance)
         return min(self.hottest_target, float(np.min(kept)))
 
-    def begin(self, command: NDArray[np.float64]) -> Drive:
+    def drive(self, command: NDArray[np.float64]) -> Drive:
         """Power of the TCAs; see the class."""
         return Drive(power=self.max_power * (command + 1.0) / 2.0)
 
-    def finish(self, drive: Drive, error: SimulationDiverged | None) -> Outcome:
-        """What the control step has led to; see ``SimulatedTask``."""
-        reason = broken_off(error)
-        self.static.locate()
-        observation = self._observe()
-        outside = OBSERVATION.outside(observation)
-        if outside:
-            reason = reason or f"diverged: {', '.join(outside)} out of bounds"
-        before = self._distance
-        if reason is None:  # nothing is known of a diverged state
-            self._distance = self._gap()
-        near = reason is None and self._distance <= self.tolerance
-        self._at_target = self._at_target + 1 if near else 0
-        excess = np.maximum(self.sim.temperature - self.hot_temperature, 0.0)
-        heat = float(np.sum(excess)) if reason is None else 0.0
-        damage = None if reason else self._damage()
-        reason = reason or damage
-        success = self._held > self.hold_time - 1e-9 and reason is None
-        observation[OBSERVATION.slices["time at the target"]] = min(self._held, self.hold_time)
-        observation = OBSERVATION.bounded(observation) if outside else observation
-        terms = {
-            "reach": (before - self._distance) / self.tolerance,
-            "goal": 10.0 if success else 0.0,
-            "energy": -0.02 * float(np.sum(drive.power)) * self.control_period,
-            "heat": -0.002 * heat,
-            "end": -5.0 if damage else 0.0,
-        }
-        info = {"reward_terms": terms, "success": success, **self._info()}
-        if reason is not None:
-            info["truncation_reason"] = reason
-        return observation, float(sum(terms.values())), success, reason is not None, info
+    def judge(self, drive: Drive, harmed: bool) -> Verdict:
+        """How far the tip is from the target, and how long it has been there."""
+        before, self._distance = self._distance, self._gap()
+        self._at_target = self._at_target + 1 if self._distance <= self.tolerance else 0
+        success = self._held > self.hold_time - 1e-9 and not harmed
+        return Verdict(
+            terms={
+                "reach": (before - self._distance) / self.tolerance,
+                "goal": 10.0 if success else 0.0,
+            },
+            success=success,
+            seen={"time at the target": min(self._held, self.hold_time)},
+        )
 
     @property
     def _held(self) -> float:
@@ -243,45 +205,32 @@ class BendReach(SimulatedTask):
         """Distance of tip and target [m]."""
         return float(np.linalg.norm(self.static.tip() - self.target))
 
-    def _damage(self) -> str | None:
-        """Why a TCA does not survive, or None."""
+    def observe(self) -> dict[str, ArrayLike]:
+        """See ``OBSERVATION``."""
+        self.static.locate()
         sim = self.sim
-        hot = sim.temperature > self.max_temperature
-        if hot.any():
-            name = sim.tca_names[int(np.argmax(hot))]
-            return f"overheated: {name} above {self.max_temperature} °C"
-        torn = sim.tension > sim.bank.breaking_force
-        if torn.any():
-            i = int(np.argmax(torn))
-            return f"torn: {sim.tca_names[i]} above {sim.bank.breaking_force[i]} N"
-        return None
+        return {
+            "TCA temperature": sim.temperature,
+            "TCA length": sim.length,
+            "TCA tension": sim.tension,
+            "tip position": self.static.tip(),
+            "tip velocity": self.static.velocity(),
+            "target position": self.target,
+            "time at the target": min(self._held, self.hold_time),
+        }
 
-    def _observe(self) -> Observation:
-        sim = self.sim
-        return OBSERVATION.pack(
-            {
-                "TCA temperature": sim.temperature,
-                "TCA length": sim.length,
-                "TCA tension": sim.tension,
-                "tip position": self.static.tip(),
-                "tip velocity": self.static.velocity(),
-                "target position": self.target,
-                "time at the target": min(self._held, self.hold_time),
-            }
-        )
-
-    def _info(self) -> dict[str, Any]:
-        sim = self.sim
+    def details(self) -> dict[str, Any]:
+        """The target [m], temperatures that reach it [°C], and how far the tip is from it [m]."""
         return {
             "target": self.target.copy(),
             "target_temperature": self.target_temperature.copy(),
             "distance_to_target": self._distance,
-            "time": sim.time,
-            "energy": sim.energy.copy(),
-            **heat_of_tcas(sim),
-            "tension": sim.tension.copy(),
-            "variation": asdict(self.variation),
         }
+
+    def bent(self) -> float:
+        """Angle of the tip from straight down [rad]."""
+        down = -float(self.data.site("bench.module.tip").xmat[8])
+        return float(np.arccos(np.clip(down, -1.0, 1.0)))
 
 
 BendReachVector = partial(TaskVector, BendReach)

@@ -1,6 +1,6 @@
 """Spaces as tables: every entry of an observation or action with its name, bounds and unit."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -19,6 +19,7 @@ class Entry:
         low: Lower bound.
         high: Upper bound.
         unit: Unit, ``-`` for none.
+        off: Of an action, what leaves the robot alone; None for the middle of the bounds.
     """
 
     name: str
@@ -26,6 +27,7 @@ class Entry:
     low: float
     high: float
     unit: str
+    off: float | None = None
 
 
 class Table:
@@ -54,7 +56,13 @@ class Table:
         """The table as a Gymnasium ``Box`` of float32."""
         return Box(self._low, self._high, dtype=np.float32)
 
-    def pack(self, values: dict[str, ArrayLike]) -> NDArray[np.float32]:
+    @property
+    def still(self) -> NDArray[np.float32]:
+        """The action that leaves the robot alone, shape (size,)."""
+        off = [(e.low + e.high) / 2.0 if e.off is None else e.off for e in self.entries]
+        return np.repeat(off, [entry.size for entry in self.entries]).astype(np.float32)
+
+    def pack(self, values: Mapping[str, ArrayLike]) -> NDArray[np.float32]:
         """Lays the rows' values end to end.
 
         Raises:

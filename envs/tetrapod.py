@@ -1,22 +1,21 @@
 """``TCA/TetrapodCrawl-v0``, ``Walk`` and ``Shimmy``: a robot of one shape gets on (Sun, 6.3.2)."""
 
 import math
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from tca_mj.assets import mjcf
-from tca_mj.envs.base import Observation, Outcome, SimulatedTask, broken_off, heat_of_tcas
+from tca_mj.envs.options import Constant, Option, Options, Setup, Uniform, variation_options
 from tca_mj.envs.stance import CAMERAS, LEG_TCAS, Stance, tetrapod_scene
-from tca_mj.envs.table import Entry, Table, numbers
+from tca_mj.envs.table import Entry, Table
+from tca_mj.envs.task import Headway, SimulatedTask, Verdict
 from tca_mj.envs.vector import TaskVector
-from tca_mj.robots.tetrapod import TetrapodSpec
-from tca_mj.sim import Drive, SimulationDiverged
-from tca_mj.variation import Nominal, Variation
+from tca_mj.robots.tetrapod import LEGS, TetrapodSpec
+from tca_mj.sim import Drive
 
 OBSERVATION = Table(
     [
@@ -33,7 +32,7 @@ OBSERVATION = Table(
         Entry("commanded direction", 2, -1.0, 1.0, "-"),
     ]
 )
-ACTION = Table([Entry("TCA power", LEG_TCAS, -1.0, 1.0, "-")])
+ACTION = Table([Entry("TCA power", LEG_TCAS, -1.0, 1.0, "-", off=-1.0)])
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -70,6 +69,17 @@ _UPRIGHT = 0.5  # cosine of the tilt from which on it has fallen over
 _SUNK = 12e-3  # depth below its first height at which it has fallen off the beam [m]
 
 
+def _fine_legs(spec: TetrapodSpec) -> dict[str, Any]:
+    """Legs of ten nodes; their plates have the mass of the others'."""
+    fill = spec.leg.plate_fill * (spec.leg.nodes + 1) / 11.0
+    return {"robot": replace(spec, leg=replace(spec.leg, nodes=10, plate_fill=fill))}
+
+
+def _fine_body(spec: TetrapodSpec) -> dict[str, Any]:
+    """With these legs, every spine an elastic chain of its own."""
+    return {**_fine_legs(replace(spec, nodes=6)), "body": "fine"}
+
+
 class TetrapodGait(SimulatedTask):
     """Get on in a commanded direction, cold and rigid in one shape, by the legs alone.
 
@@ -98,13 +108,8 @@ class TetrapodGait(SimulatedTask):
         end: Minus 5 in the step in which the robot falls, or a TCA is too hot or torn.
 
     Reset: the robot is put down at the origin and comes to rest, for 0.5 s that are not counted.
-    Where it looks and how far its body is bent is drawn. Options:
-        direction: Commanded direction, from world x to y [rad]; 0 by default, on a beam also pi.
-        yaw: Where the robot looks, from world x to y [rad]; within ``task.yaw_range``.
-        bend: Bend of its body [rad]; within 1 degree of ``task.bend``.
-        friction, mass, tca_gain, heat_loss, ambient: The fields of ``tca_mj.variation.Variation``.
-        randomise: Spread with which those of them are drawn that are not given; 0.2 is 20 % and
-            5 K. By default 0.
+    Where it looks and how far its body is bent is drawn; ``options`` is the table of all that can
+    be given.
 
     Terminates with ``info["termination_reason"]`` when the robot has fallen over or off the beam.
     Truncates after the time limit, and with ``info["truncation_reason"]`` if a TCA is too hot or
@@ -117,6 +122,13 @@ class TetrapodGait(SimulatedTask):
     max_temperature: ClassVar[float] = 180.0  # annealing temperature, Sun, Table 2.1 [°C]
     hot_temperature: ClassVar[float] = 172.0  # from here on heat is charged [°C]
     control_period: ClassVar[float] = 0.1  # [s]
+    terms = ("progress", "drift", "posture", "energy", "heat", "end")
+    energy_price, heat_price, end_price = 0.002, 0.002, 5.0
+    scripted = "tca_mj.agents.tetrapod_gaits:scripted"
+    robot_argument = ("robot", TetrapodSpec)
+    finer = {"legs": _fine_legs, "fine": _fine_body}
+    legs = len(LEGS)
+    learning_options = {"randomise": 0.2}
     bend_range: ClassVar[float] = math.radians(1.0)  # largest deviation of the body's bend [rad]
 
     def __init__(
@@ -153,7 +165,7 @@ class TetrapodGait(SimulatedTask):
         self.task = TASKS[gait]
         self.robot = robot or TetrapodSpec()
         objects = {} if self.task.beam is None else {"beam": mjcf("beam.xml")}
-        self.sim = tetrapod_scene(
+        sim = tetrapod_scene(
             mjcf("ground.xml"),
             objects,
             self.robot,
@@ -162,33 +174,45 @@ class TetrapodGait(SimulatedTask):
             body=body,
             bend=self.task.bend,
         )
-        self.stance = Stance(self.sim, self.robot)
-        self.observation_space = OBSERVATION.space
-        self.action_space = ACTION.space
-        self._nominal = Nominal(self.sim)
+        self.stance = Stance(sim, self.robot)
+        self._open(sim, OBSERVATION, ACTION, self._options())
         self._forward = np.array([1.0, 0.0])
         self._start = np.zeros(3)
         self._along, self._aside = 0.0, 0.0
-        self._progress = self._judge()
-        self._varied = asdict(self.variation)
+        self._progress = self._measure()
 
-    @property
-    def variation(self) -> Variation:
-        """How far the robot of this episode is off."""
-        return self._nominal.variation
+    def _options(self) -> Options:
+        task = self.task
+        bends = task.bend - self.bend_range, task.bend + self.bend_range
+        return Options(
+            [
+                Option(
+                    name="yaw", about="where the robot looks, from world x to y", unit="rad",
+                    low=-task.yaw_range, high=task.yaw_range, drawn="drawn",
+                    draw=Uniform(-task.yaw_range, task.yaw_range),
+                ),
+                Option(
+                    name="bend", about="bend of its body", unit="rad", low=bends[0], high=bends[1],
+                    draw=self._draw_bend, drawn="drawn",
+                ),
+                Option(
+                    name="direction", about="commanded direction, from world x to y", unit="rad",
+                    low=-math.pi, high=math.pi, check=self._check_direction, draw=Constant(0.0),
+                    drawn="0",
+                ),
+                *variation_options(),
+            ]
+        )  # fmt: skip
 
-    def reset(
-        self, *, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[Observation, dict[str, Any]]:
-        """Starts an episode; see the class for the options.
+    def _draw_bend(self, random: np.random.Generator, setup: Setup) -> float:
+        return self.task.bend + random.uniform(-self.bend_range, self.bend_range)
 
-        Raises:
-            ValueError: If an option is unknown or out of its range.
-        """
-        super().reset(seed=seed)
-        setup = self._setup(options or {})
-        self._nominal.apply(setup["variation"])
-        self._varied = asdict(self.variation)
+    def _check_direction(self, value: Any) -> None:
+        if self.task.beam is not None and abs(math.sin(value)) > 1e-6:
+            raise ValueError(f"direction must be 0 or pi on a beam, got {value}")
+
+    def prepare(self, setup: Setup) -> None:
+        """Puts the robot down, where it comes to rest."""
         self.sim.reset(
             self.stance.placer(bend=setup["bend"], yaw=setup["yaw"], above=self.task.beam or 0.0)
         )
@@ -197,84 +221,22 @@ class TetrapodGait(SimulatedTask):
         direction = setup["direction"]
         self._forward = np.array([math.cos(direction), math.sin(direction)])
         self._start = self.stance.position(self.data).copy()
-        self._progress = self._judge()
-        return self._observe(), self._info()
+        self._progress = self._measure()
 
-    def _setup(self, options: Mapping[str, Any]) -> dict[str, Any]:
-        """Draws what the options leave open. All draws are made, so that options shift none."""
-        random, task = self.np_random, self.task
-        drawn = {
-            "yaw": random.uniform(-task.yaw_range, task.yaw_range),
-            "bend": task.bend + random.uniform(-self.bend_range, self.bend_range),
-            "direction": 0.0,
-            "randomise": 0.0,
-        }
-        draws = random.uniform(-1.0, 1.0, len(Variation.names()))
-        known = [*drawn, *Variation.names()]
-        unknown = [key for key in options if key not in known]
-        if unknown:
-            raise ValueError(f"options must be some of {sorted(known)}, got {unknown}")
-        given = {key: float(numbers(key, value, ())) for key, value in options.items()}
-        setup = {key: given.pop(key, value) for key, value in drawn.items()}
-        for key, middle, reach in (
-            ("yaw", 0.0, task.yaw_range),
-            ("bend", task.bend, self.bend_range),
-            ("direction", 0.0, math.pi),
-            ("randomise", 0.25, 0.25),
-        ):
-            if not abs(setup[key] - middle) <= reach + 1e-9:
-                raise ValueError(
-                    f"{key} must be between {middle - reach:.4f} and {middle + reach:.4f},"
-                    f" got {setup[key]}"
-                )
-        if task.beam is not None and abs(math.sin(setup["direction"])) > 1e-6:
-            raise ValueError(f"direction must be 0 or pi on a beam, got {setup['direction']}")
-        varied = asdict(Variation.drawn(draws.tolist(), setup["randomise"]))
-        return setup | {"variation": Variation(**(varied | given))}
-
-    def begin(self, command: NDArray[np.float64]) -> Drive:
+    def drive(self, command: NDArray[np.float64]) -> Drive:
         """Power of the legs' TCAs; see the class."""
         power = np.zeros(self.sim.n)
         power[:LEG_TCAS] = self.max_power * (command + 1.0) / 2.0
         return Drive(power=power)
 
-    def finish(self, drive: Drive, error: SimulationDiverged | None) -> Outcome:
-        """What the control step has led to; see ``SimulatedTask``."""
-        reason = broken_off(error)
-        observation = self._observe()
-        outside = OBSERVATION.outside(observation)
-        if outside:
-            reason = reason or f"diverged: {', '.join(outside)} out of bounds"
-            observation = OBSERVATION.bounded(observation)
-        before, tilt, fallen = self._progress, 0.0, None
-        if reason is None:  # nothing is known of a diverged state
-            self._progress = self._judge()
-            tilt = 1.0 - float(self.stance.rotation(self.data)[2, 2])
-            fallen = self._fallen(tilt)
+    def judge(self, drive: Drive, harmed: bool) -> Verdict:
+        """Headway, and whether the robot has fallen."""
+        before, self._progress = self._progress, self._measure()
+        tilt = 1.0 - float(self.stance.rotation(self.data)[2, 2])
         terms = {name: value - before[name] for name, value in self._progress.items()}
-        damage = None if reason else self._damage()
-        excess = np.maximum(self.sim.temperature - self.hot_temperature, 0.0)
-        terms |= {
-            "posture": -0.2 * tilt,
-            "energy": -0.002 * float(np.sum(drive.power)) * self.control_period,
-            "heat": -0.002 * float(np.sum(excess)) if reason is None else 0.0,
-            "end": -5.0 if fallen or damage else 0.0,
-        }
-        reason = reason or damage
-        info = {"reward_terms": terms, **self._info()}
-        if reason is not None:
-            info["truncation_reason"] = reason
-        if fallen is not None:
-            info["termination_reason"] = fallen
-        return (
-            observation,
-            float(sum(terms.values())),
-            fallen is not None,
-            reason is not None,
-            info,
-        )
+        return Verdict(terms=terms | {"posture": -0.2 * tilt}, ended=self._fallen(tilt))
 
-    def _judge(self) -> dict[str, float]:
+    def _measure(self) -> dict[str, float]:
         """How far the robot has got, by reward term."""
         x, y, _ = (self.stance.position(self.data) - self._start).tolist()
         forward_x, forward_y = self._forward.tolist()
@@ -294,52 +256,42 @@ class TetrapodGait(SimulatedTask):
             return "fell off the beam"
         return None
 
-    def _damage(self) -> str | None:
-        """Why a TCA does not survive, or None."""
-        sim = self.sim
-        hot = sim.temperature > self.max_temperature
-        if hot.any():
-            name = sim.tca_names[int(np.argmax(hot))]
-            return f"overheated: {name} above {self.max_temperature} °C"
-        torn = sim.tension > sim.bank.breaking_force
-        if torn.any():
-            i = int(np.argmax(torn))
-            return f"torn: {sim.tca_names[i]} above {sim.bank.breaking_force[i]} N"
-        return None
-
-    def _observe(self) -> Observation:
+    def observe(self) -> dict[str, ArrayLike]:
+        """See ``OBSERVATION``."""
         data, sim, stance = self.data, self.sim, self.stance
         turn = data.xquat[stance.hub]
         linear, angular = stance.velocity(data)
-        return OBSERVATION.pack(
-            {
-                "TCA temperature": sim.temperature[:LEG_TCAS],
-                "TCA length": sim.length[:LEG_TCAS],
-                "TCA tension": sim.tension[:LEG_TCAS],
-                "orientation": turn if turn[0] >= 0.0 else -turn,
-                "height": stance.position(data)[2] - (self.task.beam or 0.0),
-                "velocity": linear,
-                "angular velocity": angular,
-                "foot position": stance.feet_in_body(data),
-                "leg contact": stance.touching(data),
-                "body bend": stance.bend(data),
-                "commanded direction": self._forward @ stance.rotation(data)[:2, :2],
-            }
-        )
+        return {
+            "TCA temperature": sim.temperature[:LEG_TCAS],
+            "TCA length": sim.length[:LEG_TCAS],
+            "TCA tension": sim.tension[:LEG_TCAS],
+            "orientation": turn if turn[0] >= 0.0 else -turn,
+            "height": stance.position(data)[2] - (self.task.beam or 0.0),
+            "velocity": linear,
+            "angular velocity": angular,
+            "foot position": stance.feet_in_body(data),
+            "leg contact": stance.touching(data),
+            "body bend": stance.bend(data),
+            "commanded direction": self._forward @ stance.rotation(data)[:2, :2],
+        }
 
-    def _info(self) -> dict[str, Any]:
-        sim = self.sim
+    def details(self) -> dict[str, Any]:
+        """Headway [m] and speed [m/s]."""
+        time = self.sim.time
         return {
             "distance": self._along,
             "drift": self._aside,
-            "speed": self._along / sim.time if sim.time > 0.0 else 0.0,
-            "time": sim.time,
-            "energy": sim.energy.copy(),
-            "heater_energy": sim.spines.energy.copy(),
-            **heat_of_tcas(sim),
-            "tension": sim.tension.copy(),
-            "variation": self._varied.copy(),
+            "speed": self._along / time if time > 0.0 else 0.0,
         }
+
+    def bent(self) -> float:
+        """Angle between the ends of the spines [rad]."""
+        return self.stance.bend(self.data)
+
+    def headway(self) -> Headway:
+        """From where it was put down."""
+        weight = 9.81 * float(self.model.body_subtreemass[self.stance.hub])
+        return Headway(along=self._along, aside=self._aside, weight=weight)
 
 
 def _period(control_period: float, timestep: float) -> float:

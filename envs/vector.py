@@ -18,8 +18,8 @@ from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
 from tca_mj.batch import SimulationBatch
-from tca_mj.envs.base import Observation, Outcome, SimulatedTask
 from tca_mj.envs.table import numbers
+from tca_mj.envs.task import Observation, Outcome, SimulatedTask
 
 Options = Mapping[str, Any] | None
 Flags = NDArray[np.bool_]

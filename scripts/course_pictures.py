@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tca_mj.agents.course import CourseWalker
-from tca_mj.agents.tetrapod_gaits import GaitPolicy
+from tca_mj.agents.tetrapod_gaits import gait_policy
 from tca_mj.envs.course import TetrapodCourse
 from tca_mj.envs.tetrapod import TetrapodGait
 from tca_mj.render import Offscreen, colour_tendons
@@ -49,7 +49,7 @@ def shapes(out: Path) -> None:
     """Crawling, walking and clamping a beam, as in the tasks of single gaits."""
     frames = []
     for gait, (seconds, distance, up) in SHAPES.items():
-        env, policy = TetrapodGait(gait=gait), GaitPolicy.of(gait)
+        env, policy = TetrapodGait(gait=gait), gait_policy(gait)
         observation, _ = env.reset(seed=0)
         for _ in range(round(seconds / env.control_period)):
             observation, *_ = env.step(policy.act(observation))

@@ -1,6 +1,7 @@
 """How often, and how fast, the scripted controller finishes the tetrapod's course.
 
-    python scripts/course_table.py --seeds 10 --randomise 0.2 --out runs/course
+    python scripts/course_table.py --seeds 10 --friction 0.2 --out runs/course/friction
+    python scripts/course_table.py --seeds 10 --everything 0.2 --out runs/course/everything
 
 Prints a Markdown table, one row per seed, and writes each row to the folder as soon as it is known;
 rows that lie there already are not run again unless --fresh is given.
@@ -13,15 +14,16 @@ from pathlib import Path
 
 import numpy as np
 
-from tca_mj.agents.demo import PUBLISHED_SPEED, tetrapod_course
+from tca_mj.agents.demo import play
+from tca_mj.envs.course import TetrapodCourse
 
 
-def row(seed: int, randomise: float, out: Path) -> dict[str, object]:
+def row(seed: int, options: dict[str, float], out: Path) -> dict[str, object]:
     """The summary of one episode, from the folder or run now."""
     path = out / f"seed{seed}.json"
     if path.is_file():
         return json.loads(path.read_text(encoding="utf-8"))
-    result = tetrapod_course(seed=seed, randomise=randomise, progress=False)
+    result = play("TCA/TetrapodCourse-v0", seed=seed, options=options, progress=False)
     path.write_text(json.dumps(result, indent=2), encoding="utf-8")
     return result
 
@@ -30,20 +32,22 @@ def main(argv: list[str] | None = None) -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--seeds", type=int, default=10)
     parser.add_argument("--first", type=int, default=0)
-    parser.add_argument("--randomise", type=float, default=0.2)
+    parser.add_argument("--friction", type=float, default=0.0, help="share by which it is off")
+    parser.add_argument("--everything", type=float, default=0.0, help="the same of the robot")
     parser.add_argument("--out", type=Path, default=Path("runs/course"))
     parser.add_argument("--fresh", action="store_true")
     args = parser.parse_args(argv)
     if args.fresh:
         shutil.rmtree(args.out, ignore_errors=True)
     args.out.mkdir(parents=True, exist_ok=True)
-    names = list(PUBLISHED_SPEED)
+    names = list(TetrapodCourse.published_speed)
+    options = {"randomise_friction": args.friction, "randomise": args.everything}
     print("| seed | friction | finished | time | " + " | ".join(f"{n} [mm/s]" for n in names)
           + " | energy | hottest | largest tension |")  # fmt: skip
     print("|---" * (7 + len(names)) + "|", flush=True)
     rows = []
     for seed in range(args.first, args.first + args.seeds):
-        result = row(seed, args.randomise, args.out)
+        result = row(seed, options, args.out)
         rows.append(result)
         speeds = {r["name"]: 1e3 * r["speed"] for r in result["speeds"]}
         energy = sum(result["energy"].values()) + sum(result["heater_energy"].values())
@@ -60,7 +64,7 @@ def main(argv: list[str] | None = None) -> None:
     for name in names:
         speeds = [1e3 * s["speed"] for r in rows for s in r["speeds"] if s["name"] == name]
         if speeds:
-            share = 100.0 * np.mean(speeds) / (1e3 * PUBLISHED_SPEED[name])
+            share = 100.0 * np.mean(speeds) / (1e3 * TetrapodCourse.published_speed[name])
             print(f"{name}: {np.mean(speeds):.2f} mm/s, {share:.0f} % of the published speed")
 
 

@@ -17,7 +17,7 @@ from unittest import mock
 import mujoco
 import numpy as np
 
-from tca_mj.agents.tetrapod_gaits import GaitPolicy
+from tca_mj.agents.tetrapod_gaits import gait_policy
 from tca_mj.envs.tetrapod import TetrapodGait
 from tca_mj.modules import leg
 from tca_mj.modules.bending import BendingSpec, bending_module
@@ -145,7 +145,7 @@ def _lift(data: mujoco.MjData, height: float) -> None:
 def walking(world: World, gait: str = "walk") -> float:
     """Speed of the scripted walk over a minute [mm/s]."""
     env = TetrapodGait(gait=gait, robot=world.robot)
-    policy = GaitPolicy.of(gait, world.robot)
+    policy = gait_policy(gait, world.robot)
     observation, info = env.reset(seed=0)
     for _ in range(round(GAIT_TIME / env.control_period)):
         observation, _, terminated, truncated, info = env.step(policy.act(observation))

@@ -20,14 +20,16 @@ from typing import Any
 import numpy as np
 from tqdm import tqdm
 
-from tca_mj.agents.demo import pick_and_place
+from tca_mj.agents.demo import play
 from tca_mj.envs.arm import OBJECTS
 from tca_mj.machine import machine, versions
+
+TASK = "TCA/ArmPickPlace-v0"
 
 
 def run(case: tuple[str, int]) -> dict[str, Any]:
     """The summary of one episode that is not recorded."""
-    return pick_and_place(object=case[0], seed=case[1], progress=False)
+    return play(TASK, seed=case[1], options={"object": case[0]}, progress=False)
 
 
 def kept(path: Path) -> dict[tuple[str, int], dict[str, Any]]:

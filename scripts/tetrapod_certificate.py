@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from tca_mj.agents.policy import load_policy
-from tca_mj.agents.tetrapod_gaits import GAITS, GaitPolicy
+from tca_mj.agents.tetrapod_gaits import GAITS, gait_policy
 from tca_mj.certify.rest import Load, rest
 from tca_mj.envs.tetrapod import TetrapodGait
 from tca_mj.model.part import Part
@@ -343,7 +343,7 @@ def headway(gait: str, seconds: float, **options: Any) -> Array:
         seconds: Time that counts, rounded to whole cycles.
         **options: Of ``TetrapodGait``.
     """
-    env, policy = TetrapodGait(gait=gait, **options), GaitPolicy.of(gait)
+    env, policy = TetrapodGait(gait=gait, **options), gait_policy(gait)
     period = policy.gait.period / env.control_period
     first, last = (round(math.ceil(n) * period) for n in (100.0 / period, 10.0 * seconds / period))
     observation, begin = env.reset(seed=0)
@@ -394,7 +394,7 @@ def rods(seconds: float = 60.0) -> list[str]:
             for who in WHO:
                 env = TetrapodGait(gait=name, robot=robot)
                 learned = who == "searched"
-                policy = load_policy(f"tetrapod-{name}", env) if learned else GaitPolicy.of(name)
+                policy = load_policy(f"tetrapod-{name}", env) if learned else gait_policy(name)
                 observation, info = env.reset(seed=0)
                 done = False
                 while info["time"] < seconds - 1e-9 and not done:

@@ -25,7 +25,7 @@ import mujoco
 import numpy as np
 
 from tca_mj.agents.policy import load_policy
-from tca_mj.agents.tetrapod_gaits import GAITS, GaitPolicy
+from tca_mj.agents.tetrapod_gaits import GAITS, gait_policy
 from tca_mj.envs.tetrapod import ACTION, TetrapodGait
 from tca_mj.machine import machine, versions
 from tca_mj.robots.tetrapod import LEGS
@@ -122,7 +122,7 @@ def follow(run: Run) -> tuple[Run, float, float]:
     policy = None
     if run.who != "random":
         learned = run.who == "learned"
-        policy = load_policy(f"tetrapod-{run.gait}", env) if learned else GaitPolicy.of(run.gait)
+        policy = load_policy(f"tetrapod-{run.gait}", env) if learned else gait_policy(run.gait)
     deepest = 0.0
 
     def watch(model: Any, data: Any, steps: int = 1) -> None:
@@ -197,7 +197,7 @@ def slide(gait: str) -> float:
 
 def cost(gait: str, steps: int = 200) -> tuple[float, float]:
     """Processor time of ``env.step`` [s], and that over the time of its physics steps."""
-    env, policy, inside = TetrapodGait(gait=gait), GaitPolicy.of(gait), [0.0]
+    env, policy, inside = TetrapodGait(gait=gait), gait_policy(gait), [0.0]
 
     def timed(*arguments: Any) -> None:
         start = time.process_time()

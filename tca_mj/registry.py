@@ -7,9 +7,11 @@ and imports nothing but Gymnasium itself.
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from importlib import import_module
 from typing import Any
 
 import gymnasium
+from gymnasium.envs.registration import EnvSpec, load_env_creator
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -21,12 +23,14 @@ class Task:
         entry_point: ``module:class`` of the environment.
         max_episode_steps: Number of control steps after which ``TimeLimit`` truncates.
         kwargs: Arguments of the class that make it this task; a caller's own come on top.
+        demo: Name of the demo that its scripted policy is; empty for none.
     """
 
     id: str
     entry_point: str
     max_episode_steps: int
     kwargs: Mapping[str, Any] = field(default_factory=dict)
+    demo: str = ""
 
     @property
     def vector_entry_point(self) -> str:
@@ -39,6 +43,7 @@ TASKS = (
         id="TCA/ArmPickPlace-v0",
         entry_point="tca_mj.envs.arm:ArmPickPlace",
         max_episode_steps=1000,
+        demo="pick-and-place",
     ),
     Task(
         id="TCA/MorphModule-v0",
@@ -63,6 +68,7 @@ TASKS = (
         id="TCA/TetrapodCourse-v0",
         entry_point="tca_mj.envs.course:TetrapodCourse",
         max_episode_steps=15000,
+        demo="tetrapod",
     ),
 )
 
@@ -78,3 +84,40 @@ def register() -> None:
                 max_episode_steps=task.max_episode_steps,
                 kwargs=dict(task.kwargs),
             )
+
+
+DEMOS = {task.demo: task.id for task in TASKS if task.demo}
+
+
+def find_task(task: str) -> EnvSpec:
+    """What Gymnasium knows of a task.
+
+    Args:
+        task: Its id; ``module:id`` imports the module first, which registers it.
+
+    Raises:
+        ValueError: If there is no such module or task.
+    """
+    module, _, name = task.rpartition(":")
+    try:
+        if module:
+            import_module(module)
+        return gymnasium.spec(name)
+    except (ImportError, gymnasium.error.Error) as error:
+        known = [known.id for known in TASKS]
+        raise ValueError(
+            f"task must be one of {known}, or module:id of another, got {task!r}: {error}"
+        ) from error
+
+
+def task_class(task: str) -> Any:
+    """The class of a task, a ``tca_mj.envs.task.SimulatedTask``.
+
+    Raises:
+        ValueError: As ``find_task``, or if it is none.
+    """
+    entry = find_task(task).entry_point
+    found = load_env_creator(entry) if isinstance(entry, str) else entry
+    if not hasattr(found, "robot_argument"):
+        raise ValueError(f"task must be a SimulatedTask, got {task!r}, made by {entry}")
+    return found

@@ -97,6 +97,7 @@ class Nominal:
 
     Attributes:
         variation: What was applied last.
+        heat: Thermal constants of the TCAs.
     """
 
     def __init__(self, sim: Simulation) -> None:
@@ -105,7 +106,7 @@ class Nominal:
         self._figures = {
             name: getattr(sim.model, name).copy() for name in _MASSES + _INVERSE + _FRICTION
         }
-        self._heat = sim.bank.heat
+        self.heat = sim.bank.heat
         self._heater = sim.spines.bank.heater if sim.spines.n else None
         self._gain = sim.gain
         self.variation = Variation()
@@ -127,8 +128,8 @@ class Nominal:
         sim.gain = self._gain * variation.tca_gain
         loss, ambient = variation.heat_loss, variation.ambient
         sim.bank.heat = _varied(
-            self._heat, loss, ambient,
-            conductance=loss * self._heat.conductance, body_loss=loss * self._heat.body_loss,
+            self.heat, loss, ambient,
+            conductance=loss * self.heat.conductance, body_loss=loss * self.heat.body_loss,
         )  # fmt: skip
         if self._heater is not None:
             sim.spines.bank.heater = _varied(self._heater, loss, ambient)

@@ -178,7 +178,7 @@ def test_it_runs_in_parallel_processes(shared):
 
 def setup(env):
     """What a reset has drawn."""
-    rows = OBSERVATION.read(env.unwrapped._observe())
+    rows = OBSERVATION.read(env.unwrapped.seen())
     return {k: rows[k].copy() for k in ("object position", "object orientation", "cup position")}
 
 
@@ -193,7 +193,7 @@ def test_without_a_wish_the_object_is_drawn(shared):
     drawn = []
     for seed in range(3):
         gym.Env.reset(shared, seed=seed)
-        drawn.append(shared._setup({})["object"])
+        drawn.append(shared.options.setup(shared.np_random, {})["object"])
     assert [shared.reset(seed=seed)[1]["object"] for seed in range(3)] == drawn
 
 
@@ -219,7 +219,7 @@ def test_draws_fill_their_ranges(shared):
     draws = []
     for seed in range(200):
         gym.Env.reset(shared, seed=seed)
-        draws.append(shared._setup({}))
+        draws.append(shared.options.setup(shared.np_random, {}))
     yaw = np.array([draw["object_yaw"] for draw in draws])
     low, high = shared.yaw_range
     assert low <= yaw.min() < low + 0.05 * (high - low)
@@ -234,7 +234,7 @@ def test_draws_fill_their_ranges(shared):
     [
         ({"object": "hammer"}, r"object must be one of \['pcb', 'screwdriver'\], got 'hammer'"),
         ({"weight": 1.0}, r"options must be some of .*, got \['weight'\]"),
-        ({"object_position": (6e-3, 0.0)}, r"object_position must be within 0\.005 m .* got"),
+        ({"object_position": (6e-3, 0.0)}, r"object_position must be between -0\.005 and 0\.005 m"),
         ({"object_position": (0.0,)}, r"object_position must be finite numbers of shape \(2,\)"),
         ({"object_position": (math.nan, 0.0)}, "object_position must be finite numbers of shape"),
         ({"object_yaw": 0.0}, r"object_yaw must be between .* rad, got 0\.0"),
@@ -323,7 +323,7 @@ def test_an_object_out_of_reach_ends_the_episode(shared):
 def drop(env, kind, height):
     """Lets an object fall into the cup; the last step and the sum of what was earned there."""
     env.reset(seed=0, options={"object": kind})
-    cup = OBSERVATION.read(env._observe())["cup position"]
+    cup = OBSERVATION.read(env.seen())["cup position"]
     put(env, cup + [0.0, 0.0, height])
     earned = 0.0
     for _ in range(15):

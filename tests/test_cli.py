@@ -14,12 +14,14 @@ import pytest
 from tca_mj import bench, bench_vector, cli, registry
 from tca_mj.agents import demo
 from tca_mj.cli.play import _policy
-from tca_mj.envs.arm import OBJECTS, ArmPickPlace
+from tca_mj.envs.arm import ArmPickPlace
 from tca_mj.envs.viewer import NoDisplay, ViewerEnvironment, need_display
 
 TASK = "TCA/ArmPickPlace-v0"
 SUMMARY: dict[str, Any] = {
-    "object": "pcb",
+    "task": TASK,
+    "policy": "scripted",
+    "heater_energy": {},
     "success": True,
     "ending": "success",
     "duration": 31.5,
@@ -35,26 +37,27 @@ def answer(monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
     """A demo that does nothing; its summary, and under ``asked`` how it was called."""
     summary = dict(SUMMARY)
 
-    def called(**arguments: Any) -> dict[str, Any]:
-        summary["asked"] = arguments
+    def called(task: str, policy: str, **arguments: Any) -> dict[str, Any]:
+        summary["asked"] = {"task": task, "policy": policy, **arguments}
         return summary
 
-    monkeypatch.setattr(demo, "pick_and_place", called)
+    monkeypatch.setattr(demo, "play", called)
     return summary
 
 
 def test_the_demo_says_how_it_ended(
     answer: dict[str, Any], capsys: pytest.CaptureFixture[str]
 ) -> None:
-    arguments = ["demo", "pick-and-place", "--object", "pcb", "--seed", "4", "--no-video"]
-    assert cli.main(arguments) == 0
+    options = ["--option", "object=pcb", "--option", "object_position=0.001,-0.002"]
+    out = Path("runs/demo/pick-and-place")
+    assert cli.main(["demo", "pick-and-place", *options, "--seed", "4", "--no-video"]) == 0
     assert answer["asked"] == {
-        "object": "pcb", "seed": 4, "out": Path("runs/demo/pcb"), "video": False
-    }
+        "task": TASK, "policy": "scripted", "seed": 4, "out": out, "video": False,
+        "options": {"object": "pcb", "object_position": [0.001, -0.002]},
+    }  # fmt: skip
     said = capsys.readouterr().out
-    assert "the pcb is in the cup (success) after 31.5 s, 42 J, at most 140 °C" in said
-    assert str(Path("runs/demo/pcb/summary.json")) in said
-    assert str(Path("runs/demo/pcb/rollout.rrd")) in said
+    assert f"scripted in {TASK}: success after 31.5 s, 42 J, at most 140 °C" in said
+    assert str(out / "summary.json") in said and str(out / "rollout.rrd") in said
 
 
 def test_a_demo_that_fails_returns_1(
@@ -62,16 +65,16 @@ def test_a_demo_that_fails_returns_1(
 ) -> None:
     answer |= {"success": False, "ending": "time limit"}
     assert cli.main(["demo", "pick-and-place"]) == 1
-    assert "is not in the cup (time limit)" in capsys.readouterr().out
+    assert "time limit after 31.5 s" in capsys.readouterr().out
 
 
 def test_ctrl_c_returns_130(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    def interrupted(**_: Any) -> None:
+    def interrupted(*_: Any, **__: Any) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(demo, "pick_and_place", interrupted)
+    monkeypatch.setattr(demo, "play", interrupted)
     assert cli.main(["demo", "pick-and-place", "--out", str(tmp_path)]) == 130
     assert f"what was recorded is in {tmp_path}" in capsys.readouterr().err
 
@@ -82,7 +85,8 @@ def test_ctrl_c_returns_130(
         (["demo", "pick-and-place", "--seed", "-1"], "at least 0"),
         (["demo", "pick-and-place", "--seed", "1.5"], "must be a whole number, got '1.5'"),
         (["demo", "pick-and-place", "--out", f"{__file__}/new/folder"], "must be a folder"),
-        (["demo", "pick-and-place", "--object", "hammer"], "hammer"),
+        (["demo", "pick-and-place", "--option", "hammer"], "must be NAME=VALUE"),
+        (["demo", "--task", "nowhere:Mine-v0", "--policy", "off"], "nowhere"),
         (["demo", "pick-and-place", "--out", __file__], "must be a folder"),
         (["demo", "juggle"], "juggle"),
         (["view", "TCA/Nothing-v0"], TASK),
@@ -108,8 +112,12 @@ def test_help_has_examples(command: list[str], capsys: pytest.CaptureFixture[str
     assert max(map(len, said.splitlines())) <= 100
 
 
-def test_the_objects_offered_are_those_of_the_task() -> None:
-    assert cli.OBJECTS == tuple(OBJECTS)
+def test_an_option_that_the_task_refuses_returns_2(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    wrong = ["--option", "object=hammer", "--out", str(tmp_path)]
+    assert cli.main(["demo", "pick-and-place", *wrong]) == 2
+    assert "object must be one of ['pcb', 'screwdriver'], got 'hammer'" in capsys.readouterr().err
 
 
 def test_list_names_every_task_with_its_spaces(capsys: pytest.CaptureFixture[str]) -> None:

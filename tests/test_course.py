@@ -22,7 +22,7 @@ from tca_mj.agents.course import (
     Go,
     stages,
 )
-from tca_mj.agents.demo import tetrapod_course
+from tca_mj.agents.demo import play
 from tca_mj.cli import outcome, speed_table
 from tca_mj.envs.course import ACTION, OBSERVATION, TetrapodCourse
 from tca_mj.variation import Variation
@@ -95,9 +95,7 @@ def test_the_reward_is_the_sum_of_its_terms_and_headway_pays_back(shared):
         assert info["reward_terms"]["energy"] == pytest.approx(-1e-5 * spent, rel=1e-9)
         progress += info["reward_terms"]["progress"]
     assert progress == pytest.approx(10.0 * (shared.position[0] - start), abs=1e-12)
-    assert info["energy"] == pytest.approx(
-        sum(info["tca_energy"].values()) + sum(info["heater_energy"].values())
-    )
+    assert shared.energy == info["energy"].sum() + info["heater_energy"].sum() > 0.0
 
 
 def test_the_observation_is_what_the_simulation_says(shared):
@@ -120,21 +118,21 @@ def test_an_action_is_power_and_voltage(shared):
     action = OFF.copy()
     action[4], action[13], action[17] = 1.0, 0.0, 1.0
     *_, info = shared.step(action)
-    energy = info["tca_energy"]
+    energy = dict(zip(shared.sim.tca_names, info["energy"], strict=True))
     assert energy["robot.front_right.tca1"] == pytest.approx(0.4)
     assert energy["robot.spine1"] == pytest.approx(2.0)
     assert sum(energy.values()) == pytest.approx(2.4)
-    heater = shared.robot.heater
-    assert info["heater_energy"]["robot.spine2"] == pytest.approx(62.5 / float(heater.resistance))
+    heated = dict(zip(shared.sim.spines.names, info["heater_energy"], strict=True))
+    assert heated["robot.spine2"] == pytest.approx(62.5 / float(shared.robot.heater.resistance))
 
 
 @pytest.mark.parametrize(
     ("options", "message"),
     [
         ({"height": 1.0}, "options"),
-        ({"friction": 2.0}, "friction must be between 0.5 and 1.5"),
+        ({"friction": 0.0}, "friction must be finite and above 0"),
         ({"randomise": 0.6}, "randomise"),
-        ({"randomise_robot": -0.1}, "randomise_robot must be between 0 and 0.5"),
+        ({"randomise": -0.1}, "randomise must be between 0 and 0.5"),
         ({"mass": 0.0}, "mass must be finite and above 0"),
         ({"position": [0.1, 0.0]}, "position"),
         ({"yaw": "left"}, "yaw"),
@@ -159,7 +157,7 @@ def test_friction_is_drawn_and_forgotten(shared):
     foot = shared.model.geom("robot.front_left.foot").id
     drawn = []
     for seed in range(6):
-        _, info = shared.reset(seed=seed, options={"randomise": 0.2})
+        _, info = shared.reset(seed=seed, options={"randomise_friction": 0.2})
         drawn.append(info["variation"]["friction"])
         assert shared.model.geom_friction[foot, 0] == pytest.approx(
             drawn[-1] * shared.robot.leg.friction
@@ -171,13 +169,13 @@ def test_friction_is_drawn_and_forgotten(shared):
 
 
 def test_the_robot_is_varied_and_restored(shared):
-    """Everything but friction by one option, single fields by their names; nothing stays."""
+    """Everything by one option, single fields by their names; nothing stays."""
     mass = shared.model.body_mass.sum()
-    _, info = shared.reset(seed=1, options={"randomise_robot": 0.2, "ambient": 20.0})
+    _, info = shared.reset(seed=1, options={"randomise": 0.2, "ambient": 20.0})
     varied = info["variation"]
-    assert varied["friction"] == 1.0 and varied["ambient"] == 20.0
-    off = [abs(varied[name] - 1.0) for name in ("mass", "tca_gain", "heat_loss")]
-    assert all(0.0 < share <= 0.2 for share in off) and len(set(off)) == 3
+    assert varied["ambient"] == 20.0
+    off = [abs(varied[name] - 1.0) for name in ("friction", "mass", "tca_gain", "heat_loss")]
+    assert all(0.0 < share <= 0.2 for share in off) and len(set(off)) == 4
     assert shared.model.body_mass.sum() == pytest.approx(varied["mass"] * mass)
     assert shared.sim.gain == varied["tca_gain"]
     assert (shared.sim.temperature == 20.0).all() and (shared.sim.spines.temperature == 20.0).all()
@@ -256,7 +254,7 @@ def test_curled_legs_open_the_body(friction):
     bent(env, np.radians(206.0), env.places.beam_end + 0.047, 0.057)
     walker = CourseWalker(env)
     walker._number = [stage.name for stage in walker._plan].index("open")
-    observation = env._observe()
+    observation = env.seen()
     while walker._part != "harden":
         observation, *_ = env.step(walker.act(observation))
         assert env.sim.time < 30.0
@@ -271,7 +269,7 @@ def test_a_body_that_is_open_is_not_opened_again(degrees, stage):
     bent(env, np.radians(degrees), env.places.beam_end + 0.047, 0.04)
     walker = CourseWalker(env)
     walker._number = [each.name for each in walker._plan].index("open")
-    walker.act(env._observe())
+    walker.act(env.seen())
     assert walker.phase == stage
 
 
@@ -284,7 +282,7 @@ def test_the_crawl_goes_forward_and_the_walk_is_faster():
         bent(env, np.radians(angle), 0.0 if gait == "crawl" else 0.3, z)
         walker = CourseWalker(env)
         walker._number = [stage.name for stage in stages(env.places)].index(gait)
-        observation = env._observe()
+        observation = env.seen()
         for step in range(120):
             observation, *_ = env.step(walker.act(observation))
             if step == 59:
@@ -297,11 +295,14 @@ def test_the_crawl_goes_forward_and_the_walk_is_faster():
 
 
 def test_the_demo_writes_what_happened(tmp_path):
-    result = tetrapod_course(seed=1, out=tmp_path, max_duration=0.5, video=False, progress=False)
+    result = play(
+        "TCA/TetrapodCourse-v0", seed=1, out=tmp_path, max_duration=0.5, video=False,
+        progress=False,
+    )  # fmt: skip
     assert result["ending"] == "stopped after 0.5 s" and not result["success"]
     assert (tmp_path / "summary.json").is_file() and (tmp_path / "rollout.rrd").is_file()
     assert [row["name"] for row in result["speeds"]] == ["crawl"]
     assert result["speeds"][0]["published"] == 2.4e-3
     assert "| crawl |" in speed_table(result) and "2.40 mm/s" in speed_table(result)
-    assert "is not on its target" in outcome(result)
+    assert "scripted in TCA/TetrapodCourse-v0: stopped after 0.5 s" in outcome(result)
     assert result["touched_plate"] is False and result["damaged"] is False

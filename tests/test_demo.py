@@ -13,13 +13,17 @@ from numpy.typing import NDArray
 from rerun.chunk import RrdReader
 
 from tca_mj.agents import episode
-from tca_mj.agents.demo import pick_and_place
+from tca_mj.agents.demo import play
 from tca_mj.envs.arm import ArmPickPlace
 from tca_mj.render import RenderingUnavailable, gl_backend
 
 OFF = np.array([-1.0, -1.0, -1.0, -1.0, -1.0, 0.0], dtype=np.float32)
 TCAS = ["arm.bending.tca0", "arm.bending.tca1", "arm.bending.tca2", "arm.wrist.tca",
         "arm.gripper.tca"]  # fmt: skip
+
+
+def pick_and_place(object: str = "screwdriver", policy: Any = "scripted", **more: Any) -> Any:
+    return play("TCA/ArmPickPlace-v0", policy, options={"object": object}, **more)
 
 
 class Stub:

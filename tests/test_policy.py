@@ -12,7 +12,7 @@ import pytest
 from tca_mj.agents import policy as files
 from tca_mj.agents.network import Network
 from tca_mj.agents.policy import Origin, SavedPolicy, load_policy
-from tca_mj.agents.tetrapod_gaits import WALK, GaitPolicy
+from tca_mj.agents.tetrapod_gaits import WALK, gait_policy
 from tca_mj.control import Gait
 from tca_mj.envs.tetrapod import ACTION, OBSERVATION
 from tca_mj.modules.leg import LegSpec
@@ -65,7 +65,7 @@ def test_a_policy_acts_alike_after_it_was_written_and_read(kind, env, tmp_path):
     assert [p.name for p in tmp_path.iterdir()] == [path.name]
     back = SavedPolicy.read(path)
     assert (back.kind, back.task, back.origin) == (kind, WALKING, ORIGIN)
-    first, second = saved.make(), load_policy(path, env)
+    first, second = saved.make(env), load_policy(path, env)
     for policy in (first, second):
         policy.reset()
     for observation in seen(30):
@@ -75,8 +75,8 @@ def test_a_policy_acts_alike_after_it_was_written_and_read(kind, env, tmp_path):
     assert second.phase
 
 
-def test_a_gait_file_is_the_scripted_policy(tmp_path):
-    script, loaded = GaitPolicy.of("walk"), POLICIES["gait"].make()
+def test_a_gait_file_is_the_scripted_policy(env):
+    script, loaded = gait_policy("walk"), POLICIES["gait"].make(env)
     for observation in seen(70):
         observation[OBSERVATION.slices["commanded direction"]] = (1.0, 0.0)
         np.testing.assert_array_equal(loaded.act(observation), script.act(observation))
@@ -84,7 +84,7 @@ def test_a_gait_file_is_the_scripted_policy(tmp_path):
 
 def test_a_correction_makes_hotter_up_to_the_limit_and_colder():
     def heated(correction):
-        walker = GaitPolicy(WALK)
+        walker = gait_policy("walk")
         observation = np.zeros(OBSERVATION.size, dtype=np.float32)
         rows = OBSERVATION.slices
         observation[rows["TCA temperature"]] = 100.0

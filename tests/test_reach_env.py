@@ -138,7 +138,7 @@ def test_draws_fill_their_ranges(shared):
     rise = []
     for seed in range(500):
         gym.Env.reset(shared, seed=seed)
-        rise.append(shared._setup({})["rise"])
+        rise.append(shared.options.setup(shared.np_random, {})["rise"])
     rise = np.array(rise)
     hottest = rise.max(axis=1)
     assert 0.5 <= hottest.min() < 0.51 and 0.99 < hottest.max() <= 1.0

@@ -77,7 +77,7 @@ def test_what_learners_ask_of_it():
     assert envs.has_attr("sim") and not envs.has_attr("nothing")
     assert envs.render_mode is None and list(envs.get_images()) == [None] * 3
     envs.close()
-    with pytest.raises(ValueError, match="this package's tasks"):
+    with pytest.raises(ValueError, match="task must be a SimulatedTask, got 'CartPole-v1'"):
         TaskVecEnv.make("CartPole-v1", 1)
 
 

@@ -50,8 +50,6 @@ def test_designs_are_single_figures():
 def test_bad_designs_are_refused(design, message):
     with pytest.raises(ValueError, match=message):
         Evaluation(task=WALK, design=design)
-    with pytest.raises(ValueError, match="design must be empty for TCA/TetrapodCourse-v0"):
-        robot_of("TCA/TetrapodCourse-v0", design)
 
 
 def test_every_combination_is_run_and_tabled(tmp_path, monkeypatch):

@@ -16,7 +16,8 @@ from gymnasium.utils.env_checker import check_env
 from gymnasium.vector import AsyncVectorEnv
 
 import tca_mj
-from tca_mj.agents.tetrapod_gaits import GAITS, GaitPolicy
+from tca_mj.agents.tetrapod_gaits import GAITS, gait_policy
+from tca_mj.envs.options import variation_of
 from tca_mj.envs.stance import CAMERAS
 from tca_mj.envs.tetrapod import ACTION, OBSERVATION, TASKS, TetrapodGait
 from tca_mj.envs.wrappers import RecordRerun
@@ -164,7 +165,7 @@ def test_the_reward_is_the_sum_of_its_terms(walker):
 
 def test_staying_where_it_is_good_earns_nothing(walker):
     """Progress and drift are changes: they add up to where the robot is at the end."""
-    infos = follow(walker, GaitPolicy.of("walk"), 30, direction=0.4)
+    infos = follow(walker, gait_policy("walk"), 30, direction=0.4)
     for name, value in (
         ("progress", infos[-1]["distance"] / TASKS["walk"].speed),
         ("drift", -0.5 * abs(infos[-1]["drift"]) / TASKS["walk"].speed),
@@ -217,7 +218,7 @@ def test_velocities_are_those_in_the_body(walker):
     walker.data.qpos[3:7] = [math.sqrt(0.5), 0.0, 0.0, math.sqrt(0.5)]
     walker.data.qvel[:6] = [0.2, 0.0, 0.1, 0.0, 0.0, 3.0]
     mujoco.mj_forward(walker.model, walker.data)
-    rows = OBSERVATION.read(walker._observe())
+    rows = OBSERVATION.read(walker.seen())
     assert rows["velocity"] == pytest.approx([0.0, -0.2, 0.1], abs=1e-6)
     assert rows["angular velocity"] == pytest.approx([0.0, 0.0, 3.0], abs=1e-6)
     assert rows["commanded direction"] == pytest.approx([0.0, -1.0], abs=1e-6)
@@ -231,7 +232,7 @@ def test_each_tca_draws_its_foot_its_way(walker, leg):
         walker.reset(seed=0)
         walker.model.opt.gravity[:] = 0.0
         walker.data.qpos[2] += 0.05
-        before = OBSERVATION.read(walker._observe())["foot position"].reshape(4, 3)
+        before = OBSERVATION.read(walker.seen())["foot position"].reshape(4, 3)
         action = OFF.copy()
         action[3 * leg + tca] = 0.5
         for _ in range(15):
@@ -300,7 +301,8 @@ def test_recording_changes_nothing(walker, tmp_path):
 
 def drawn(env, seed, **options):
     gym.Env.reset(env, seed=seed)
-    return env._setup(options)
+    setup = env.options.setup(env.np_random, options)
+    return setup | {"variation": variation_of(setup)}
 
 
 def test_options_do_not_shift_the_other_draws(walker):
@@ -459,7 +461,7 @@ def test_it_draws_itself():
 @pytest.mark.parametrize("gait", TASKS)
 def test_the_scripted_gaits_get_on(envs, gait):
     """Two cycles after the first: at least half the published speed, without damage."""
-    env, policy = envs[gait], GaitPolicy.of(gait)
+    env, policy = envs[gait], gait_policy(gait)
     cycle = round(10 * GAITS[gait].period)
     infos = follow(env, policy, 3 * cycle)
     gained = infos[-1]["distance"] - infos[cycle - 1]["distance"]
@@ -474,7 +476,7 @@ def test_a_rigid_body_is_as_good_as_an_elastic_one():
     """And shimmies, as on single spines, which is what lets it."""
     for gait, steps in (("walk", 60), ("shimmy", 150)):
         distance = [
-            follow(TetrapodGait(gait=gait, body=body), GaitPolicy.of(gait), steps)[-1]["distance"]
+            follow(TetrapodGait(gait=gait, body=body), gait_policy(gait), steps)[-1]["distance"]
             for body in ("rigid", "elastic")
         ]
         assert distance[0] > 5e-3
@@ -484,7 +486,7 @@ def test_a_rigid_body_is_as_good_as_an_elastic_one():
 
 def test_the_walk_does_not_hang_on_the_time_step():
     """Nor on contacts that chatter: distances after a cycle and a half at 5 and 2.5 ms."""
-    policy = GaitPolicy.of("walk")
+    policy = gait_policy("walk")
     distance = [
         follow(TetrapodGait(timestep=dt), policy, 90)[-1]["distance"] for dt in (5e-3, 2.5e-3)
     ]
@@ -502,14 +504,14 @@ def test_feet_land_without_sinking_in(envs, gait, steps, monkeypatch):
             depths.append(-data.contact.dist.min() if data.ncon else 0.0)
 
     monkeypatch.setattr(mujoco, "mj_step", watched)
-    follow(envs[gait], GaitPolicy.of(gait), steps)
+    follow(envs[gait], gait_policy(gait), steps)
     assert len(depths) > 20 * steps and max(depths) < 0.3e-3
 
 
 @pytest.mark.parametrize("gait", TASKS)
 def test_mirrored_actions_end_in_the_mirror_image(envs, gait):
     """After 60 s, with a weaker left side, to a millionth of the distance."""
-    env, policy = envs[gait], GaitPolicy.of(gait)
+    env, policy = envs[gait], gait_policy(gait)
     straight = {"yaw": 0.0, "bend": TASKS[gait].bend}
     observation, _ = env.reset(seed=0, options=straight)
     actions = []
@@ -544,7 +546,7 @@ def test_contacts_do_not_make_the_speed(envs, gait):
         elif change == "thick":
             model.geom_margin[mine] *= 2.0
             model.geom_solimp[mine, 2] *= 2.0
-        infos = follow(env, GaitPolicy.of(gait), 90)
+        infos = follow(env, gait_policy(gait), 90)
         distance.append(infos[-1]["distance"] - infos[29]["distance"])
     assert distance[0] > 5e-3
     assert distance[0] == pytest.approx(distance[1], rel=0.05)
@@ -552,15 +554,15 @@ def test_contacts_do_not_make_the_speed(envs, gait):
 
 
 def test_the_script_turns_to_where_it_is_told(walker):
-    policy = GaitPolicy.of("walk")
+    policy = gait_policy("walk")
     side = follow(walker, policy, 120, direction=0.6, yaw=0.0)[-1]
     assert side["drift"] < 0.0  # it began to the right of the line and turns left
-    rows = OBSERVATION.read(walker._observe())
+    rows = OBSERVATION.read(walker.seen())
     heading = 0.6 - math.atan2(*rows["commanded direction"][::-1])
     assert heading > 0.05
 
 
 def test_the_script_takes_only_known_gaits():
     with pytest.raises(ValueError, match="gait must be one of .* got 'trot'"):
-        GaitPolicy.of("trot")
+        gait_policy("trot")
     assert set(GAITS) == set(TASKS)

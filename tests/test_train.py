@@ -20,12 +20,13 @@ from tca_mj.agents.export import exported
 from tca_mj.agents.learning_env import LearningEnv
 from tca_mj.agents.policy import ResidualPolicy, SavedPolicy, load_policy
 from tca_mj.agents.sb3_env import TaskVecEnv
-from tca_mj.agents.tetrapod_gaits import GaitPolicy
+from tca_mj.agents.tetrapod_gaits import GAITS, STEERING, gait_policy
 from tca_mj.agents.train import Run, RunFolder, _learner, train
 from tca_mj.cli import main
 from tca_mj.registry import TASKS
 
 QUICK = "TCA/MorphModule-v0"
+GAIT = GAITS["walk"], (STEERING["walk"],) * 4
 WALK = "TCA/TetrapodWalk-v0"
 REMEMBERED = OffPolicy(
     buffer_size=60, learning_starts=16, gradient_steps=1, batch_size=8, hidden=(8,)
@@ -170,9 +171,9 @@ def test_an_exported_network_acts_as_the_learner_does(algorithm):
 
 def test_the_residual_learner_sees_and_does_what_the_policy_will():
     """A correction of nothing is the gait; the clock starts anew with every episode."""
-    env = LearningEnv(TaskVecEnv.make(WALK, 2, max_episode_steps=4), lambda: GaitPolicy.of("walk"),
+    env = LearningEnv(TaskVecEnv.make(WALK, 2, max_episode_steps=4), GAIT,
                       20.0)  # fmt: skip
-    single, script = gym.make(WALK, max_episode_steps=4), GaitPolicy.of("walk")
+    single, script = gym.make(WALK, max_episode_steps=4), gait_policy("walk")
     env.seed(3)
     seen = env.reset()
     observation, _ = single.reset(seed=3)
@@ -203,7 +204,9 @@ def test_every_task_has_a_default(task, algorithm, tmp_path):
     config = default_config(task, algorithm, seed=4, envs=1)
     assert config.seed == 4 and config.task == task
     run = Run(config, RunFolder(tmp_path, config, ""), "")
-    action = run.policy().make().act(run.test_env.reset(seed=0, options=dict(config.options))[0])
+    action = run.policy().make(run.test_env).act(
+        run.test_env.reset(seed=0, options=dict(config.options))[0]
+    )
     assert run.test_env.action_space.contains(action)
     run.close()
 
@@ -211,7 +214,7 @@ def test_every_task_has_a_default(task, algorithm, tmp_path):
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"task": "Ant-v5"}, "task must be one of this package's"),
+        ({"task": "Ant-v5"}, "task must be a SimulatedTask, got 'Ant-v5'"),
         ({"algorithm": "dqn"}, "algorithm must be one of"),
         ({"algorithm": "sac"}, "learner must be OffPolicy, got OnPolicy"),
         ({"steps": 0}, "steps must be"),

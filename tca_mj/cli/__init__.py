@@ -6,17 +6,15 @@ from collections.abc import Sequence
 
 import tca_mj
 from tca_mj.cli import check, learn, play
-from tca_mj.cli.arguments import ALGORITHMS, DEMOS, MODELS, OBJECTS, POLICIES
+from tca_mj.cli.arguments import ALGORITHMS, POLICIES
 from tca_mj.cli.play import outcome, speed_table
 
-__all__ = [
-    "ALGORITHMS", "DEMOS", "MODELS", "OBJECTS", "POLICIES", "main", "outcome", "speed_table",
-]
+__all__ = ["ALGORITHMS", "POLICIES", "main", "outcome", "speed_table"]
 
 _EXAMPLES = """\
 examples:
   tca-mj demo pick-and-place                    the arm puts a screwdriver into a cup
-  tca-mj demo pick-and-place --object pcb --seed 3 --out runs/board
+  tca-mj demo pick-and-place --option object=pcb --seed 3 --out runs/board
   tca-mj demo tetrapod                          the tetrapod crawls, walks, shimmies and lies down
   rerun runs/board/rollout.rrd                  look at what happened
   tca-mj list                                   the tasks

@@ -9,12 +9,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeAlias
 
-from tca_mj.registry import TASKS
+from tca_mj.registry import find_task
 
-TASK_IDS = tuple(task.id for task in TASKS)
-OBJECTS = ("screwdriver", "pcb")
-DEMOS = ("pick-and-place", "tetrapod")
-MODELS = ("used", "legs", "fine")
 POLICIES = ("scripted", "off", "random")
 ALGORITHMS = ("cma", "ppo", "sac", "td3")
 
@@ -65,6 +61,21 @@ def parse_count(text: str) -> int:
     return int(text)
 
 
+def parse_task(text: str) -> str:
+    """A task's id, or ``module:id`` of one outside this package."""
+    try:
+        find_task(text)
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(str(error)) from error
+    return text
+
+
+def parse_option(text: str) -> tuple[str, Any]:
+    """An option of a task and its value, from ``NAME=VALUE`` or ``NAME=VALUE,VALUE,...``."""
+    name, values = parse_axis(text)
+    return name, values[0] if len(values) == 1 else list(values)
+
+
 def parse_axis(text: str) -> tuple[str, tuple[Any, ...]]:
     """A setting and its values, from ``NAME=VALUE,VALUE,...``; numbers where they are."""
     name, _, values = text.partition("=")
@@ -95,4 +106,4 @@ def parse_folder(text: str) -> Path:
 
 def task_name(task: str) -> str:
     """Name of a task's folder."""
-    return task.partition("/")[2].partition("-")[0]
+    return task.rpartition(":")[2].rpartition("/")[2].rpartition("-v")[0]

@@ -7,14 +7,13 @@ from typing import Any
 
 from tca_mj.cli.arguments import (
     ALGORITHMS,
-    MODELS,
-    TASK_IDS,
     Commands,
     add_command,
     parse_axis,
     parse_count,
     parse_folder,
     parse_seed,
+    parse_task,
     task_name,
 )
 
@@ -101,7 +100,7 @@ def add_commands(commands: Commands) -> None:
     )
     evaluation.add_argument("policy", metavar="POLICY", help="who acts")
     evaluation.add_argument(
-        "--task", choices=TASK_IDS, metavar="TASK", required=True, help="its id"
+        "--task", type=parse_task, metavar="TASK", required=True, help="its id"
     )
     evaluation.add_argument("--episodes", type=parse_count, default=10, help="default 10")
     evaluation.add_argument(
@@ -113,8 +112,7 @@ def add_commands(commands: Commands) -> None:
     )
     evaluation.add_argument("--steps", type=parse_count, help="of an episode; default: the task's")
     evaluation.add_argument(
-        "--model", choices=MODELS, default="used",
-        help="of the tetrapod: used, legs (of ten nodes), fine (and elastic single spines)",
+        "--model", default="used", help="used, or one of the task's finer models, as `list` has it",
     )
     evaluation.add_argument("--timestep", type=float, help="of the physics; default: the task's")
     evaluation.add_argument(
@@ -124,7 +122,7 @@ def add_commands(commands: Commands) -> None:
     evaluation.add_argument("--fresh", action="store_true", help="forget what the folder holds")
 
     train = add_command(commands, "train", _train, help="train a policy", text=_TRAIN)
-    train.add_argument("task", choices=TASK_IDS, metavar="TASK", help="its id")
+    train.add_argument("task", type=parse_task, metavar="TASK", help="its id")
     train.add_argument("--algo", choices=ALGORITHMS, required=True, help="how")
     train.add_argument(
         "--steps", type=parse_count, help="steps of the task in all; default: by task"
@@ -154,7 +152,7 @@ def add_commands(commands: Commands) -> None:
         commands, "sweep", _sweep, help="evaluate or train at many settings", text=_SWEEP
     )
     sweep.add_argument("policy", nargs="?", metavar="POLICY", help="who acts; not with --algo")
-    sweep.add_argument("--task", choices=TASK_IDS, metavar="TASK", required=True, help="its id")
+    sweep.add_argument("--task", type=parse_task, metavar="TASK", required=True, help="its id")
     sweep.add_argument("--algo", choices=ALGORITHMS, help="train this way, then evaluate")
     sweep.add_argument(
         "--set", action="append", default=[], type=parse_axis, metavar="NAME=VALUE,...",

@@ -6,17 +6,16 @@ from pathlib import Path
 from typing import Any
 
 from tca_mj.cli.arguments import (
-    DEMOS,
-    OBJECTS,
     POLICIES,
-    TASK_IDS,
     Commands,
     add_command,
     parse_folder,
+    parse_option,
     parse_seed,
+    parse_task,
     task_name,
 )
-from tca_mj.registry import TASKS
+from tca_mj.registry import DEMOS, TASKS, find_task, task_class
 
 _DEMO = """\
 Runs one scripted episode, or with --policy and --task one of any policy in any task, and writes
@@ -26,15 +25,16 @@ into the folder --out:
   rollout.mp4    a film (needs OpenGL and `pip install 'tca-mj[demo]'`)
   rollout.png    power, temperature, tension and bend (needs `pip install 'tca-mj[demo]'`)
 
-Exit code: 0 if the demo succeeds (the object lies in the cup, the tetrapod on its target), 1 if
-not, 2 if the command was wrong, 130 after Ctrl-C, which keeps what was recorded until then.
+Exit code: 0 if the episode is a success (a gait: it came to the end of its time), 1 if not, 2 if
+the command was wrong, 130 after Ctrl-C, which keeps what was recorded until then.
 
 examples:
-  tca-mj demo pick-and-place --object pcb
+  tca-mj demo pick-and-place --option object=pcb
   tca-mj demo pick-and-place --seed 7 --no-video      much faster
-  tca-mj demo tetrapod --randomise 0.2 --seed 3       with 20 % more or less friction
+  tca-mj demo tetrapod --option randomise_friction=0.2 --seed 3
   tca-mj demo --policy scripted --task TCA/TetrapodWalk-v0
   tca-mj demo --policy runs/train/TetrapodWalk-cma/best.json --task TCA/TetrapodWalk-v0
+  tca-mj demo --policy scripted --task my_robots:Mine/Reach-v0
 """
 
 _VIEW = """\
@@ -66,69 +66,61 @@ def add_commands(commands: Commands) -> None:
     demo = add_command(
         commands, "demo", _demo, help="run a scripted demo and record it", text=_DEMO
     )
-    demo.add_argument("name", nargs="?", choices=DEMOS, help="which demo")
+    demo.add_argument("name", nargs="?", choices=list(DEMOS), help="which demo")
     demo.add_argument("--policy", help=f"{', '.join(POLICIES)}, a shipped one, a file or a run")
-    demo.add_argument("--task", choices=TASK_IDS, metavar="TASK", help="the policy's task")
-    demo.add_argument(
-        "--object", choices=OBJECTS, default="screwdriver", help="what pick-and-place picks up"
-    )
-    demo.add_argument(
-        "--randomise", type=float, default=0.0, metavar="SHARE",
-        help="share by which the robot is off (tetrapod: its friction), 0 to 0.5; default 0",
-    )
-    demo.add_argument(
-        "--seed", type=parse_seed, default=0, help="places of object and cup; default 0"
-    )
-    demo.add_argument("--out", type=parse_folder, help="folder; default runs/demo/ and what")
+    demo.add_argument("--task", type=parse_task, metavar="TASK", help="the policy's task")
+    _add_options(demo)
+    demo.add_argument("--seed", type=parse_seed, default=0, help="of the episode; default 0")
+    demo.add_argument("--out", type=parse_folder, help="folder; default runs/demo/TASK")
     demo.add_argument(
         "--video", action=argparse.BooleanOptionalAction, default=True,
         help="make the film, which takes most of the time",
     )
 
-    add_command(commands, "list", _list, help="list the tasks, with their spaces")
+    tasks = add_command(commands, "list", _list, help="list the tasks, with their spaces")
+    tasks.add_argument(
+        "task", nargs="*", type=parse_task, metavar="TASK", help="only these, or module:id"
+    )
 
     view = add_command(commands, "view", _view, help="watch a task in a window", text=_VIEW)
-    view.add_argument("task", choices=TASK_IDS, metavar="TASK", help="its id")
+    view.add_argument("task", type=parse_task, metavar="TASK", help="its id")
     view.add_argument(
         "--policy", default="scripted", help=f"{', '.join(POLICIES)}, a shipped one or a file"
     )
-    view.add_argument("--object", choices=OBJECTS, help="default: drawn at random")
+    _add_options(view)
     view.add_argument(
         "--seed", type=parse_seed, default=0, help="seed of the first episode; default 0"
     )
 
 
-def _demo(arguments: argparse.Namespace) -> int:
-    from tca_mj.agents.demo import pick_and_place, play, tetrapod_course
+def _add_options(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--option", action="append", default=[], type=parse_option, metavar="NAME=VALUE",
+        dest="options", help="an option of the task's reset; may be given several times",
+    )
 
-    free = arguments.policy is not None
-    if free == (arguments.name is not None) or free != (arguments.task is not None):
+
+def _demo(arguments: argparse.Namespace) -> int:
+    from tca_mj.agents.demo import play
+
+    named = arguments.name is not None
+    if named == (arguments.policy is not None) or named == (arguments.task is not None):
         print("tca-mj demo: give a demo's name, or --policy and --task", file=sys.stderr)
         return 2
-    course = arguments.name == "tetrapod"
-    place = task_name(arguments.task) if free else "tetrapod" if course else arguments.object
-    out = arguments.out or Path("runs/demo") / place
+    task = DEMOS[arguments.name] if named else arguments.task
+    out = arguments.out or Path("runs/demo") / (arguments.name or task_name(task))
     try:
-        if free:
-            summary = play(
-                arguments.task, arguments.policy, seed=arguments.seed, out=out,
-                randomise=arguments.randomise, video=arguments.video,
-            )  # fmt: skip
-        elif course:
-            summary = tetrapod_course(
-                seed=arguments.seed, out=out, randomise=arguments.randomise, video=arguments.video
-            )
-        else:
-            summary = pick_and_place(
-                object=arguments.object, seed=arguments.seed, out=out, video=arguments.video
-            )
+        summary = play(
+            task, "scripted" if named else arguments.policy, seed=arguments.seed, out=out,
+            options=dict(arguments.options), video=arguments.video,
+        )  # fmt: skip
     except KeyboardInterrupt:
         print(f"interrupted; what was recorded is in {out}", file=sys.stderr)
         return 130
     except (FileNotFoundError, ValueError) as error:
         print(f"tca-mj demo: {error}", file=sys.stderr)
         return 2
-    if course:
+    if len(summary.get("speeds", ())) > 1:
         print(speed_table(summary))
     print(outcome(summary))
     for name in ["summary.json", *summary["files"]]:
@@ -138,26 +130,17 @@ def _demo(arguments: argparse.Namespace) -> int:
 
 def outcome(summary: dict[str, Any]) -> str:
     """One line on how a demo ended, from its summary."""
-    if "policy" in summary:
-        where = "has success" if summary["success"] else "has come to its end"
-        who = f"{summary['policy']} in {summary['task']}"
-        energy = sum(summary["energy"].values()) + sum(summary["heater_energy"].values())
-    elif "object" in summary:
-        where = "is in the cup" if summary["success"] else "is not in the cup"
-        who, energy = f"the {summary['object']}", sum(summary["energy"].values())
-    else:
-        where = "lies on its target" if summary["success"] else "is not on its target"
-        who = "the tetrapod"
-        energy = sum(summary["energy"].values()) + sum(summary["heater_energy"].values())
+    energy = sum(summary["energy"].values()) + sum(summary["heater_energy"].values())
     return (
-        f"{who} {where} ({summary['ending']}) after {summary['duration']:.1f} s,"
-        f" {energy:.0f} J, at most {max(summary['peak_temperature'].values()):.0f} °C;"
+        f"{summary['policy']} in {summary['task']}: {summary['ending']} after"
+        f" {summary['duration']:.1f} s, {energy:.0f} J,"
+        f" at most {max(summary['peak_temperature'].values()):.0f} °C;"
         f" simulated at {summary['real_time_factor']:.1f} times real time"
     )
 
 
 def speed_table(summary: dict[str, Any]) -> str:
-    """Headway of the course's stages against what is published, as Markdown."""
+    """Headway of a demo's phases against what is published, as Markdown."""
     lines = ["| stage | time | distance | speed | published |", "|---|---|---|---|---|"]
     for phase, row in zip(summary["phases"], summary["speeds"], strict=True):
         published = "" if row["published"] is None else f"{1e3 * row['published']:.2f} mm/s"
@@ -174,14 +157,20 @@ def _list(arguments: argparse.Namespace) -> int:
     from tca_mj.agents.policy import SavedPolicy, shipped
 
     policies = {name: SavedPolicy.read(path) for name, path in shipped().items()}
-    for task in TASKS:
-        env = gymnasium.make(task.id, disable_env_checker=True)
+    demos = {task: name for name, task in DEMOS.items()}
+    for task in arguments.task or [task.id for task in TASKS]:
+        env: Any = gymnasium.make(task, disable_env_checker=True)
         about = (type(env.unwrapped).__doc__ or "").strip().partition("\n")[0]
-        print(task.id)
+        print(task)
         print(f"    {about}")
         print(f"    action {env.action_space.shape}, observation {env.observation_space.shape}")
+        print(f"    options {', '.join(env.unwrapped.options.names)}")
+        if task_class(task).finer:
+            print(f"    finer models {', '.join(task_class(task).finer)}")
+        if task in demos:
+            print(f"    demo {demos[task]}")
         for name, policy in policies.items():
-            if policy.task == task.id:
+            if policy.task == find_task(task).id:
                 print(f"    policy {name}: {policy.kind} by {policy.origin.algorithm}")
         env.close()
     return 0
@@ -203,7 +192,7 @@ def _view(arguments: argparse.Namespace) -> int:
     except (FileNotFoundError, ValueError) as error:
         print(f"tca-mj view: {error}", file=sys.stderr)
         return 2
-    options = {"object": arguments.object} if arguments.object else None
+    options = dict(arguments.options) or None
     print("space starts and pauses, backspace begins the next episode, F1 lists all keys")
     launch(env, policy, seed=arguments.seed, options=options, title=arguments.task)
     return 0

@@ -1,0 +1,109 @@
+"""A gait on feedback of the temperatures: an observation in, an action out."""
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tca_mj.control import Gait, Thermostat
+from tca_mj.envs.table import Table
+from tca_mj.tca import HeatSpec
+
+
+@dataclass(slots=True, kw_only=True)
+class GaitPolicy:
+    """The power that makes the TCAs of legs as hot as a gait says, steered to a direction.
+
+    It can act in every task with ``legs`` whose action is the power of their TCAs, leg by leg, and
+    which sees the rows "TCA temperature" and "commanded direction". Legs are left and right by
+    turns.
+
+    Attributes:
+        gait: The gait.
+        steering: How much cooler the legs of the side to turn to are kept, per angle between where
+            the robot looks and where it ought to, one number or one for each leg [K/rad].
+        seen: Table of the observation.
+        heat: Thermal constants of the TCAs that it was told, fields of shape (TCAs,).
+        max_power: Power of each of them at an action of 1 [W].
+        hottest: Temperature that corrections may not pass, unless the gait does [°C].
+        control_period: Time between two actions [s].
+        time: Time since the start [s].
+    """
+
+    gait: Gait
+    steering: float | tuple[float, ...] = 0.0
+    seen: Table
+    heat: HeatSpec
+    max_power: float
+    hottest: float
+    control_period: float
+    time: float = 0.0
+    _thermostat: Thermostat = field(init=False)
+    _left: NDArray[np.float64] = field(init=False)
+
+    def __post_init__(self) -> None:
+        self._thermostat = Thermostat(heat=self.heat, max_power=self.max_power)
+        self._left = (np.arange(self.gait.legs) + 1.0) % 2.0
+
+    @classmethod
+    def in_task(
+        cls, env: Any, gait: Gait, steering: float | tuple[float, ...]
+    ) -> "GaitPolicy":
+        """A gait in an environment.
+
+        Raises:
+            ValueError: If no gait can do the task, or its legs are not those of the gait.
+        """
+        task = env.unwrapped
+        if task.legs != gait.legs:
+            raise ValueError(f"gait must have {task.legs} legs, got {gait.legs}")
+        n = task.action.size
+        return cls(
+            gait=gait,
+            steering=steering,
+            seen=task.observation,
+            heat=HeatSpec(capacity=task.heat.capacity[:n], loss=task.heat.loss[:n]),
+            max_power=task.max_power,
+            hottest=task.hot_temperature,
+            control_period=task.control_period,
+        )
+
+    @property
+    def phase(self) -> str:
+        """What it does: a gait has no phases that are worth a name."""
+        return "gait"
+
+    @property
+    def cycle(self) -> float:
+        """Where in the cycle it is, 0 to 1."""
+        return self.time / self.gait.period % 1.0
+
+    def reset(self) -> None:
+        """Starts anew."""
+        self.time = 0.0
+
+    def act(
+        self, observation: NDArray[np.float32], correction: NDArray[np.float64] | float = 0.0
+    ) -> NDArray[np.float32]:
+        """The action for the next control period, one number for each TCA.
+
+        Args:
+            observation: What is seen.
+            correction: Added to the temperatures of the gait, one number for each TCA [K]. What it
+                makes hotter than both the gait and ``hottest`` is cut off there.
+        """
+        rows = self.seen.read(observation.astype(np.float64))
+        target = self.gait.temperature(self.time / self.gait.period).reshape(len(self._left), -1)
+        x, y = rows["commanded direction"]
+        aside = np.arctan2(y, x)
+        weaker = np.clip(np.array(self.steering) * aside, -80.0, 80.0)
+        side = self._left if aside > 0.0 else 1.0 - self._left
+        target = (target - (np.abs(weaker) * side)[:, None]).ravel()
+        limit = np.maximum(target, self.hottest)
+        self.time += self.control_period
+        power = self._thermostat.power(
+            rows["TCA temperature"], np.minimum(target + correction, limit)
+        )
+        action = 2.0 * power / self.max_power - 1.0
+        return np.clip(action, -1.0, 1.0).astype(np.float32)

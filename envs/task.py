@@ -1,0 +1,403 @@
+"""What all tasks share: the course of an episode, how tools reach it, and its picture."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass, field
+from typing import Any, ClassVar
+
+import gymnasium as gym
+import mujoco
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from tca_mj.envs.options import Options, Setup, variation_of
+from tca_mj.envs.table import Table, numbers
+from tca_mj.render import Offscreen, colour_tendons
+from tca_mj.sim import Drive, Simulation, SimulationDiverged, SimulationOverheated
+from tca_mj.tca import HeatSpec
+from tca_mj.variation import Nominal, Variation
+
+Observation = NDArray[np.float32]
+Action = NDArray[np.float32]
+Outcome = tuple[Observation, float, bool, bool, dict[str, Any]]
+"""What ``step`` returns: observation, reward, terminated, truncated and info."""
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Verdict:
+    """What a task says of a step that went well.
+
+    Attributes:
+        terms: Its own terms of the reward.
+        success: Whether the task is done, which ends the episode.
+        ended: What else ends it, or None.
+        seen: Rows of the observation that judging has changed.
+    """
+
+    terms: Mapping[str, float]
+    success: bool = False
+    ended: str | None = None
+    seen: Mapping[str, ArrayLike] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Headway:
+    """How a robot gets on.
+
+    Attributes:
+        along: Distance along its way [m].
+        aside: Distance from the line of its way, positive to the left [m].
+        weight: Weight of the robot [N].
+    """
+
+    along: float
+    aside: float
+    weight: float
+
+
+class SimulatedTask(gym.Env[Observation, Action], ABC):
+    """A task that runs a ``Simulation``; its heirs say what is seen, done and paid for.
+
+    The episode is run here, in one order. ``reset`` draws the options, varies the robot and has
+    the heir ``prepare`` it. A step is ``begin``, in which the heir says what the action does to
+    the simulation (``drive``), then the simulation, then ``finish``: has the simulation broken
+    off, is something seen out of its bounds, is a TCA damaged (``harm``), what has been earned and
+    is the episode over (``judge``). A vector environment calls begin and finish for each of its
+    tasks and lets all simulations run between them.
+
+    Reward: the heir's terms, and ``energy``, minus ``energy_price`` per joule of electrical energy;
+    ``heat``, minus ``heat_price`` per kelvin by which a TCA is above ``hot_temperature``, and
+    ``end``, minus ``end_price`` in the step in which something is damaged or ends the episode
+    without success. ``terms`` names all of them; those that nothing was earned by are 0.
+
+    Every ``info`` has ``time`` [s]; ``energy`` of each TCA and ``heater_energy`` of each spine
+    since the reset [J]; ``temperature`` and ``body_temperature`` of the TCAs and what they lie in,
+    ``spine_temperature`` [°C]; ``extrapolated``, whether a TCA is hotter than what its law was
+    measured at; ``tension`` [N]; ``damaged``, whether a TCA was contracted against a stiff spine;
+    ``variation``, by how much the robot is off; ``success``; after a step also ``reward_terms`` and
+    ``cost``, apart from the reward: for each TCA above ``hot_temperature`` its share of the way to
+    ``max_temperature``, and 1 for damage.
+
+    Attributes:
+        sim: The simulation.
+        observation: Table of what is seen.
+        action: Table of what is done.
+        options: Table of the options of ``reset``.
+        control_period: Time of one step [s].
+        max_temperature: Temperature that ends an episode [°C].
+        hot_temperature: Temperature from which on heat is charged [°C].
+        terms: Names of the terms of the reward.
+        scripted: ``module:callable`` that makes its scripted policy from the task, or such a
+            callable.
+        robot_argument: Argument of ``__init__`` that is the robot's specification, and what makes
+            the default one; None if it has none.
+        legs: Legs, each with the same TCAs, that a gait can drive; 0 if none can.
+        film_speed: Simulated seconds per second of film.
+        published_speed: Speeds of the real robot by the stage that shows them [m/s].
+        learning_steps: Steps by algorithm after which the task was learned.
+        learning_options: Options of every reset in training.
+        finer: Finer models of the robot by name: each turns the specification into arguments of
+            ``__init__``, the finer specification among them.
+    """
+
+    metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 10}
+    control_period: ClassVar[float] = 0.1
+    max_temperature: ClassVar[float] = 180.0
+    hot_temperature: ClassVar[float] = np.inf
+    terms: ClassVar[tuple[str, ...]] = ("energy",)
+    energy_price: ClassVar[float] = 0.0
+    heat_price: ClassVar[float] = 0.0
+    end_price: ClassVar[float] = 0.0
+    scripted: ClassVar[str | Callable[[Any], Any] | None] = None
+    robot_argument: ClassVar[tuple[str, Callable[[], Any]] | None] = None
+    finer: ClassVar[Mapping[str, Callable[[Any], dict[str, Any]]]] = {}
+
+    legs: ClassVar[int] = 0
+    film_speed: ClassVar[float] = 8.0
+    published_speed: ClassVar[Mapping[str, float]] = {}
+    learning_steps: ClassVar[Mapping[str, int]] = {}
+    learning_options: ClassVar[Mapping[str, float]] = {}
+
+    sim: Simulation
+    observation: Table
+    action: Table
+    options: Options
+    render_mode: str | None
+    _camera: str
+    _size: tuple[int, int]
+    _screen: Offscreen | None = None
+
+    def _open(self, sim: Simulation, observation: Table, action: Table, options: Options) -> None:
+        """Takes what the task is made of; to be called once by ``__init__``."""
+        self.sim = sim
+        self.observation, self.action, self.options = observation, action, options
+        self.observation_space, self.action_space = observation.space, action.space
+        self._nominal = Nominal(sim)
+        self._varied: dict[str, float] = asdict(self.variation)
+        self._used = 0.0
+
+    def _look(
+        self,
+        render_mode: str | None,
+        camera: str,
+        size: tuple[int, int],
+        *,
+        cameras: Sequence[str],
+        prefix: str = "",
+    ) -> None:
+        """Keeps how the task is to be drawn: by ``camera``, one of ``cameras``.
+
+        Raises:
+            ValueError: If the mode or the camera is unknown, or the size below a pixel.
+        """
+        modes = self.metadata["render_modes"]
+        if render_mode not in (None, *modes):
+            raise ValueError(f"render_mode must be None or one of {modes}, got {render_mode!r}")
+        if camera not in cameras:
+            raise ValueError(f"camera must be one of {list(cameras)}, got {camera!r}")
+        if numbers("size", size, (2,)).min() < 1.0:
+            raise ValueError(f"size must be at least 1 pixel each way, got {size}")
+        self.render_mode = render_mode
+        self._camera, self._size = prefix + camera, size
+
+    @abstractmethod
+    def prepare(self, setup: Setup) -> None:
+        """Begins an episode: resets the simulation and puts everything where it starts.
+
+        Args:
+            setup: A value for every option.
+        """
+
+    @abstractmethod
+    def drive(self, command: NDArray[np.float64]) -> Drive:
+        """Translates a command, the action within its bounds, to what drives the simulation."""
+
+    @abstractmethod
+    def observe(self) -> dict[str, ArrayLike]:
+        """What is seen: a value for every row of ``observation``."""
+
+    @abstractmethod
+    def judge(self, drive: Drive, harmed: bool) -> Verdict:
+        """What a step has led to. It is not asked after a step that has diverged.
+
+        Args:
+            drive: What drove the simulation.
+            harmed: Whether something is damaged: there is no success then.
+        """
+
+    def seen(self) -> Observation:
+        """The observation."""
+        return self.observation.pack(self.observe())
+
+    def details(self) -> dict[str, Any]:
+        """What ``info`` says besides."""
+        return {}
+
+    def outcome(self) -> dict[str, Any]:
+        """What the summary of a demo says of the end of its episode, besides what all have."""
+        return {}
+
+    def bent(self) -> float:
+        """By which angle the robot is bent, for plots [rad]; not a number if that means nothing."""
+        return float("nan")
+
+    def headway(self) -> Headway | None:
+        """How the robot gets on; None if it is not to."""
+        return None
+
+    @property
+    def heat(self) -> HeatSpec:
+        """Thermal constants of the TCAs as they were built, fields of shape (n,)."""
+        return self._nominal.heat
+
+    @property
+    def variation(self) -> Variation:
+        """By how much the robot of this episode is off."""
+        return self._nominal.variation
+
+    @property
+    def energy(self) -> float:
+        """Electrical energy put into TCAs and heaters since the reset [J]."""
+        return float(self.sim.energy.sum() + self.sim.spines.energy.sum())
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Observation, dict[str, Any]]:
+        """Starts an episode; ``self.options`` is the table of the options.
+
+        Raises:
+            ValueError: If an option is unknown or out of its range.
+        """
+        super().reset(seed=seed)
+        setup = self.options.setup(self.np_random, options or {})
+        variation = variation_of(setup)
+        self._nominal.apply(variation)
+        self._varied = asdict(variation)
+        self.prepare(setup)
+        return self.seen(), self._info(success=False)
+
+    def begin(self, command: NDArray[np.float64]) -> Drive:
+        """What drives the simulation in this step; errors as ``drive``."""
+        self._used = self.energy
+        return self.drive(command)
+
+    def finish(self, drive: Drive, error: SimulationDiverged | None) -> Outcome:
+        """What the step has led to; see the class.
+
+        Args:
+            drive: What ``begin`` returned.
+            error: Why the simulation broke off, or None.
+        """
+        table, sim = self.observation, self.sim
+        reason = broken_off(error)
+        observation = self.seen()
+        outside = table.outside(observation)
+        if outside:
+            reason = reason or f"diverged: {', '.join(outside)} out of bounds"
+            observation = table.bounded(observation)
+        terms = dict.fromkeys(self.terms, 0.0)
+        success, ended, cost = False, None, 0.0
+        if reason is None:  # nothing is known of a diverged state
+            reason = self.harm()
+            verdict = self.judge(drive, reason is not None)
+            terms |= verdict.terms
+            success, ended = verdict.success, verdict.ended
+            for name, value in verdict.seen.items():
+                observation[table.slices[name]] = value
+            excess = np.maximum(sim.temperature - self.hot_temperature, 0.0)
+            if self.heat_price:
+                terms["heat"] = -self.heat_price * float(np.sum(excess))
+            if self.hot_temperature < self.max_temperature:
+                cost = float(np.sum(excess)) / (self.max_temperature - self.hot_temperature)
+            if self.end_price and (reason or ended):
+                terms["end"] = -self.end_price
+        terms["energy"] = -self.energy_price * (self.energy - self._used)
+        info = {"reward_terms": terms, "cost": cost + (reason is not None)}
+        info |= self._info(success=success)
+        if reason is not None:
+            info["truncation_reason"] = reason
+        if ended is not None:
+            info["termination_reason"] = ended
+        terminated, truncated = success or ended is not None, reason is not None
+        return observation, float(sum(terms.values())), terminated, truncated, info
+
+    def harm(self) -> str | None:
+        """What the robot does not survive, or None."""
+        sim = self.sim
+        hot = sim.temperature > self.max_temperature
+        if hot.any():
+            name = sim.tca_names[int(np.argmax(hot))]
+            return f"overheated: {name} above {self.max_temperature} °C"
+        torn = sim.tension > sim.bank.breaking_force
+        if torn.any():
+            i = int(np.argmax(torn))
+            return f"torn: {sim.tca_names[i]} above {sim.bank.breaking_force[i]} N"
+        return None
+
+    def _info(self, *, success: bool) -> dict[str, Any]:
+        sim = self.sim
+        return {
+            "time": sim.time,
+            "energy": sim.energy.copy(),
+            "heater_energy": sim.spines.energy.copy(),
+            "temperature": sim.temperature.copy(),
+            "body_temperature": sim.body_temperature.copy(),
+            "spine_temperature": sim.spines.temperature.copy(),
+            "extrapolated": sim.extrapolated,
+            "tension": sim.tension.copy(),
+            "damaged": sim.spines.damaged.copy(),
+            "variation": self._varied.copy(),
+            "success": success,
+            **self.details(),
+        }
+
+    def command(self, action: Action) -> NDArray[np.float64]:
+        """The action as finite numbers within -1 and 1.
+
+        Raises:
+            ValueError: If the action has the wrong shape, is not finite or out of [-1, 1].
+        """
+        command = numbers("action", action, self.action_space.shape or ())
+        if np.abs(command).max() > 1.0 + 1e-6:
+            raise ValueError(f"action must be within -1 and 1, got {command}")
+        return np.clip(command, -1.0, 1.0)
+
+    def step(self, action: Action) -> Outcome:
+        """Runs the simulation for ``control_period``; see the class.
+
+        Raises:
+            ValueError: If the action has the wrong shape, is not finite or out of [-1, 1].
+        """
+        drive = self.begin(self.command(action))
+        error = None
+        try:
+            self.sim.step(drive.power, self.control_period, voltage=drive.voltage, fan=drive.fan)
+        except SimulationDiverged as diverged:
+            error = diverged
+        return self.finish(drive, error)
+
+    # What tools that know Gymnasium's own MuJoCo environments look for.
+    @property
+    def model(self) -> mujoco.MjModel:
+        """The compiled model."""
+        return self.sim.model
+
+    @property
+    def data(self) -> mujoco.MjData:
+        """MuJoCo's state."""
+        return self.sim.data
+
+    @property
+    def dt(self) -> float:
+        """Time of one step [s]."""
+        return self.control_period
+
+    @property
+    def camera(self) -> str:
+        """Name of the camera of the pictures."""
+        return self._camera
+
+    def paint(self) -> None:
+        """Gives what is hot the colour of its temperature; no physics reads it."""
+        colour_tendons(self.model, self.sim.tendon, self.sim.temperature)
+
+    def render(self) -> NDArray[np.uint8] | None:
+        """A picture of the scene, shape (height, width, 3), or None without a render mode.
+
+        Raises:
+            RenderingUnavailable: If there is no OpenGL.
+        """
+        if self.render_mode is None:
+            return None
+        if self._screen is None:
+            width, height = self._size
+            self._screen = Offscreen(self.model, width=width, height=height, camera=self._camera)
+        self.paint()
+        return self._screen.draw(self.data)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Everything but the window: a copy goes on where this one is."""
+        return self.__dict__ | {"_screen": None}
+
+    def close(self) -> None:
+        """Frees what rendering took."""
+        if self._screen is not None:
+            self._screen.close()
+            self._screen = None
+
+
+def broken_off(error: SimulationDiverged | None) -> str | None:
+    """Why a simulation broke off, as a reason to truncate an episode; None if it did not."""
+    if error is None:
+        return None
+    kind = "overheated" if isinstance(error, SimulationOverheated) else "diverged"
+    return f"{kind}: {error}"
+
+
+def how_it_ended(terminated: bool, truncated: bool, info: dict[str, Any]) -> str | None:
+    """Why an episode is over, in a few words; None if it goes on."""
+    if terminated:
+        return "success" if info.get("success") else info.get("termination_reason", "terminated")
+    if truncated:
+        return info.get("truncation_reason", "time limit")
+    return None
