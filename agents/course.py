@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 PUSH = replace(WALK, offset=(0.0,) * 4)
 """The walk with both legs of a pair together, where the body does not rest on its legs."""
 
-HURRY = replace(SHIMMY, period=11.5, hot=(170.0, 150.0, 170.0))
+HURRY = replace(SHIMMY, period=8.5, hot=(170.0,) * 3)
 """The shimmy with stronger strokes: the beam is wider than the one of its task."""
 
 STEP = WALK
@@ -64,7 +64,8 @@ class Bend:
         angle: Bend from rail to rail [rad]; None is the memorised shape, which needs no TCA.
         steps: Gait of the legs while the body bends, so that friction does not hold it.
         braced: Whether the legs curl inwards from beginning to end, which opens the body.
-        reaching: Whether the rear legs reach forward while the body is soft, clear of the desk.
+        reaching: Whether the rear legs reach forward while the body is soft, clear of the desk,
+            and the front legs are lifted.
         enough: Bend up to which the stage is left out; None: never [rad].
     """
 
@@ -242,6 +243,7 @@ class CourseWalker:
         legs = np.full((4, 3), _OFF)
         if stage.reaching and self._part in ("soften", "bend"):
             lifting = self._part == "soften" and self._time < 3.0
+            legs[:2] = _LIFTED  # legs that press would roll the soft body off the beam
             legs[2:] = _LIFTED if lifting else _REACHING
         elif stage.braced and self._part != "release":
             legs[:] = _BRACED

@@ -248,7 +248,7 @@ def load_policy(source: str | Path, env: Any) -> Policy:
     """
     saved = SavedPolicy.read(find(source))
     spec = env.spec
-    if spec is not None and spec.id != saved.task:
+    if spec is not None and spec.id != saved.task.rpartition(":")[2]:
         raise ValueError(f"{source} is a policy for {saved.task}, not for {spec.id}")
     network = saved.network
     if network is not None:

@@ -1,0 +1,86 @@
+"""A task, its robot and its script in a folder outside the package: every command works on it."""
+
+import json
+import re
+from pathlib import Path
+
+import gymnasium as gym
+import numpy as np
+import pytest
+
+from tca_mj import bench_vector, cli
+from tca_mj.agents.config import OffPolicy, TrainConfig
+from tca_mj.agents.evaluate import Evaluation, evaluate
+from tca_mj.agents.sweep import Sweep
+from tca_mj.envs.wrappers import RecordRerun
+
+ROOT = Path(__file__).parent.parent
+NOD = "own_task:Example/Nod-v0"
+
+
+@pytest.fixture(autouse=True)
+def examples(monkeypatch):
+    monkeypatch.syspath_prepend(str(ROOT / "examples"))
+
+
+def test_it_is_listed_and_its_options_with_it(capsys):
+    assert cli.main(["list", NOD]) == 0
+    said = capsys.readouterr().out
+    assert "Nod to an angle" in said and "options angle, randomise" in said
+
+
+def test_it_is_evaluated_also_off_and_by_design(tmp_path, capsys):
+    command = ["eval", "scripted", "--task", NOD, "--episodes", "2", "--out", str(tmp_path)]
+    assert cli.main([*command, "--randomise", "0.1"]) == 0
+    assert "success" in capsys.readouterr().out
+    off = evaluate(Evaluation(task=NOD, policy="off", steps=5, episodes=1))
+    assert off["episodes"][0]["energy"] == 0.0
+    longer = Evaluation(task=NOD, design={"length": 0.06}).make()
+    assert longer.unwrapped.data.site("robot.stick.tip").xpos[2] == pytest.approx(0.04, abs=2e-3)
+
+
+def test_it_is_demonstrated_and_recorded(tmp_path, capsys):
+    command = ["demo", "--policy", "scripted", "--task", NOD, "--no-video"]
+    options = ["--option", "angle=0.2", "--out", str(tmp_path)]
+    assert cli.main([*command, *options]) == 0
+    assert f"scripted in {NOD}: success" in capsys.readouterr().out
+    summary = json.loads((tmp_path / "summary.json").read_text())
+    assert summary["phases"][0]["name"] == "nod" and "rollout.rrd" in summary["files"]
+    with RecordRerun(gym.make(NOD), tmp_path / "own.rrd") as env:
+        env.reset(seed=0)
+        env.step(np.zeros(1, dtype=np.float32))
+    assert (tmp_path / "own.rrd").stat().st_size > 1000
+
+
+def test_it_is_learned_and_what_was_learned_acts(tmp_path, capsys):
+    pytest.importorskip("stable_baselines3")
+    from tca_mj.agents.train import train
+
+    config = TrainConfig(
+        task=NOD, algorithm="sac", learner=OffPolicy(learning_starts=20, hidden=(8,)), steps=60,
+        envs=2, interval=40, evaluation_episodes=1,
+    )  # fmt: skip
+    train(config, tmp_path / "run", video=False, progress=False)
+    command = ["eval", str(tmp_path / "run"), "--task", NOD, "--episodes", "1"]
+    assert cli.main([*command, "--steps", "5", "--out", str(tmp_path / "eval")]) == 0
+    assert "return" in capsys.readouterr().out
+
+
+def test_it_is_swept_and_timed():
+    sweep = Sweep(evaluation=Evaluation(task=NOD), axes={"design.length": (0.05, 0.06)})
+    lengths = [trial.evaluation(Path()).make().unwrapped.sim.model for trial in sweep.trials()]
+    assert lengths[0].body_mass.sum() < lengths[1].body_mass.sum()
+    assert NOD in bench_vector.benchmark(ids=[NOD], num_envs=2, scale=0.1)["tasks"]
+
+
+def test_the_machinery_names_no_task_and_no_robot():
+    """The files that belong to a task may: scripted policies and gaits."""
+    own = {"course", "morph", "reach", "scripted", "tetrapod_gaits"}
+    name = re.compile(r"TCA/\w|Tetrapod|tetrapod|ArmPick|BendReach|MorphModule|PickAndPlace|Course")
+    files = [p for p in (ROOT / "agents").glob("*.py") if p.stem not in own]
+    files += (ROOT / "tca_mj" / "cli").glob("*.py")
+    assert len(files) > 15
+    for path in files:
+        code = re.sub(r'""".*?"""|"""\\\n.*?"""', "", path.read_text(), flags=re.DOTALL)
+        found = [line for line in code.splitlines() if name.search(line)]
+        assert (path.name, found) == (path.name, [])
