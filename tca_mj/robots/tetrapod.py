@@ -172,9 +172,26 @@ def rigid_tetrapod(
             piece.quat = _bent(bend, SIDES[side], nodes)
     attach_legs(part, spec.leg)
     for i, x in enumerate(spec.places):  # their TCAs are seen and have a mass
-        tca = route_spine_tca(mjspec, halves, spec, x, f"spine{i}")
-        mjspec.delete(mjspec.actuator(tca.name))
+        _draw(mjspec, route_spine_tca(mjspec, halves, spec, x, f"spine{i}"), halves)
     return part
+
+
+def _draw(mjspec: mujoco.MjSpec, tca: RoutedTca, halves: Mapping[str, Chain]) -> None:
+    """Puts rods that touch nothing where the tendon is, which would be computed in every step."""
+    tendon = mjspec.tendon(tca.name)
+    width, colour = float(tendon.width), tendon.rgba.copy()
+    mjspec.delete(mjspec.actuator(tca.name))
+    mjspec.delete(tendon)
+    for chain in halves.values():
+        for number, piece in enumerate(chain.pieces):
+            end = chain.piece * (0.5 if number in (0, chain.nodes) else 1.0)
+            for site in [site for site in piece.sites if site.name.startswith(f"{tca.name}.")]:
+                x, y, _ = site.pos
+                piece.add_geom(
+                    type=mujoco.mjtGeom.mjGEOM_CYLINDER, fromto=[x, y, 0.0, x, y, end],
+                    size=[width, 0.0, 0.0], contype=0, conaffinity=0, mass=0.0, rgba=colour,
+                )  # fmt: skip
+                mjspec.delete(site)
 
 
 def set_rigid_bend(model: mujoco.MjModel, bend: float, *, prefix: str = "") -> None:
