@@ -153,6 +153,12 @@ class Stance:
         """Angle between the ends of the spines, 0 if they are straight [rad]."""
         return self._bend if self._rigid else float(self._signs @ data.qpos[self._bends])
 
+    def shape(self, bend: float) -> None:
+        """Makes a rigid body one of another shape; an elastic one takes its own."""
+        if self._rigid:
+            self._bend = bend
+            set_rigid_bend(self._model, bend, prefix="robot.")
+
     def position(self, data: mujoco.MjData) -> Array:
         """Of the hub in the world, shape (3,) [m]."""
         return data.xpos[self.hub]
@@ -203,9 +209,7 @@ class Stance:
         """
 
         def place(data: mujoco.MjData) -> None:
-            if self._rigid:
-                self._bend = bend
-                set_rigid_bend(self._model, bend, prefix="robot.")
+            self.shape(bend)
             data.qpos[self._bends] = self._signs * bend / (2 * self._nodes)
             data.qpos[self._beside] = -bend / (2 * self._nodes)
             turn = (math.cos(yaw / 2.0), 0.0, 0.0, math.sin(yaw / 2.0))

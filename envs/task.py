@@ -2,6 +2,7 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
+from copy import deepcopy
 from dataclasses import asdict, dataclass, field
 from typing import Any, ClassVar
 
@@ -14,6 +15,7 @@ from tca_mj.envs.options import Options, Setup, variation_of
 from tca_mj.envs.table import Table, numbers
 from tca_mj.render import Offscreen, colour_tendons
 from tca_mj.sim import Drive, Simulation, SimulationDiverged, SimulationOverheated
+from tca_mj.state import SimulationState, get_state, set_state
 from tca_mj.tca import HeatSpec
 from tca_mj.variation import Nominal, Variation
 
@@ -53,6 +55,28 @@ class Headway:
     along: float
     aside: float
     weight: float
+
+
+@dataclass(frozen=True, kw_only=True, slots=True, eq=False)
+class TaskState:
+    """The state of an episode.
+
+    Attributes:
+        simulation: That of the simulation.
+        variation: By how much the robot is off.
+        random: That of the generator.
+        episode: What the task itself remembers.
+    """
+
+    simulation: SimulationState
+    variation: Variation
+    random: Mapping[str, Any]
+    episode: Mapping[str, Any]
+
+
+# What of a task may change in an episode has one of these types; and what never does, by name.
+_VALUES = (bool, int, float, str, tuple, dict, np.ndarray, np.generic)
+_BUILT = ("render_mode", "_camera", "_size", "spec", "metadata")
 
 
 class SimulatedTask(gym.Env[Observation, Action], ABC):
@@ -280,6 +304,42 @@ class SimulatedTask(gym.Env[Observation, Action], ABC):
             info["termination_reason"] = ended
         terminated, truncated = success or ended is not None, reason is not None
         return observation, float(sum(terms.values())), terminated, truncated, info
+
+    def get_state(self, old: TaskState | None = None) -> TaskState:
+        """The state of the episode between two steps: simulation, generator, and what is judged.
+
+        A time limit that Gymnasium's wrapper keeps is none of it.
+
+        Args:
+            old: A state of this task that is no longer wanted, whose memory is taken.
+        """
+        kept = self._episode()
+        return TaskState(
+            simulation=get_state(self.sim, None if old is None else old.simulation),
+            variation=self.variation,
+            random=deepcopy(self.np_random.bit_generator.state),
+            episode=deepcopy(kept),
+        )
+
+    def set_state(self, state: TaskState) -> None:
+        """Goes back to a state of this task, or to one of a task that was built alike.
+
+        Raises:
+            ValueError: If it is of another task.
+        """
+        if state.episode.keys() != self._episode().keys():
+            raise ValueError(f"state must be of a {type(self).__name__} that was built alike")
+        self._nominal.apply(state.variation)
+        set_state(self.sim, state.simulation)
+        self.np_random.bit_generator.state = state.random
+        self.__dict__.update(deepcopy(dict(state.episode)))
+
+    def _episode(self) -> dict[str, Any]:
+        """What of the task may change in an episode."""
+        return {
+            key: value for key, value in self.__dict__.items()
+            if key not in _BUILT and isinstance(value, _VALUES)
+        }  # fmt: skip
 
     def harm(self) -> str | None:
         """What the robot does not survive, or None."""

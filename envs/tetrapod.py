@@ -12,7 +12,7 @@ from tca_mj.assets import mjcf
 from tca_mj.envs.options import Constant, Option, Options, Setup, Uniform, variation_options
 from tca_mj.envs.stance import CAMERAS, LEG_TCAS, Stance, tetrapod_scene
 from tca_mj.envs.table import Entry, Table
-from tca_mj.envs.task import Headway, SimulatedTask, Verdict
+from tca_mj.envs.task import Headway, SimulatedTask, TaskState, Verdict
 from tca_mj.envs.vector import TaskVector
 from tca_mj.robots.tetrapod import LEGS, TetrapodSpec
 from tca_mj.sim import Drive
@@ -179,6 +179,7 @@ class TetrapodGait(SimulatedTask):
         self._forward = np.array([1.0, 0.0])
         self._start = np.zeros(3)
         self._along, self._aside = 0.0, 0.0
+        self._bend = self.task.bend
         self._progress = self._measure()
 
     def _options(self) -> Options:
@@ -213,8 +214,9 @@ class TetrapodGait(SimulatedTask):
 
     def prepare(self, setup: Setup) -> None:
         """Puts the robot down, where it comes to rest."""
+        self._bend = setup["bend"]
         self.sim.reset(
-            self.stance.placer(bend=setup["bend"], yaw=setup["yaw"], above=self.task.beam or 0.0)
+            self.stance.placer(bend=self._bend, yaw=setup["yaw"], above=self.task.beam or 0.0)
         )
         self.sim.step(np.zeros(self.sim.n), _SETTLING)
         self.data.time = 0.0
@@ -222,6 +224,11 @@ class TetrapodGait(SimulatedTask):
         self._forward = np.array([math.cos(direction), math.sin(direction)])
         self._start = self.stance.position(self.data).copy()
         self._progress = self._measure()
+
+    def set_state(self, state: TaskState) -> None:
+        """As every task's; a rigid body gets its shape back."""
+        super().set_state(state)
+        self.stance.shape(self._bend)
 
     def drive(self, command: NDArray[np.float64]) -> Drive:
         """Power of the legs' TCAs; see the class."""
