@@ -20,11 +20,14 @@ Array = NDArray[np.float64]
 PUSH = replace(WALK, offset=(0.0,) * 4)
 """The walk with both legs of a pair together, where the body does not rest on its legs."""
 
-HURRY = replace(SHIMMY, period=8.5, hot=(170.0,) * 3)
+HURRY = replace(SHIMMY, period=11.5, hot=(170.0, 150.0, 170.0))
 """The shimmy with stronger strokes: the beam is wider than the one of its task."""
 
-STEP = WALK
-"""Steps while the body bends: a foot that is lifted does not hold the body by its friction."""
+STEP = Gait(
+    period=4.0, offset=(0.0, 0.5, 0.5, 0.0), start=(0.0, 0.5, 0.5), duty=(0.5,) * 3,
+    hot=(150.0,) * 3, warm=(40.0,) * 3,
+)  # fmt: skip
+"""Steps with little headway: a foot that is lifted does not hold the body down by its friction."""
 
 _OFF = 25.0  # temperature at which nothing is heated [°C]
 # A leg curled inwards: where friction holds its foot, it turns the rail outwards.
@@ -64,8 +67,7 @@ class Bend:
         angle: Bend from rail to rail [rad]; None is the memorised shape, which needs no TCA.
         steps: Gait of the legs while the body bends, so that friction does not hold it.
         braced: Whether the legs curl inwards from beginning to end, which opens the body.
-        reaching: Whether the rear legs reach forward while the body is soft, clear of the desk,
-            and the front legs are lifted.
+        reaching: Whether the rear legs reach forward while the body is soft, clear of the desk.
         enough: Bend up to which the stage is left out; None: never [rad].
     """
 
@@ -83,7 +85,7 @@ def stages(places: Places) -> tuple[Go | Bend, ...]:
     walking = np.radians(95.0)
     return (
         Go(name="crawl", gait=CRAWL, until=places.stand, steers=0.0),
-        Bend(name="stand up", angle=walking, steps=STEP),
+        Bend(name="stand up", angle=walking, steps=WALK),
         # On until the front feet have left the desk wherever they swing; then the rear ones push,
         # until the roots of their legs have left it as well.
         Go(name="walk", gait=WALK, until=places.first_edge - station + 0.019, steers=0.0),
@@ -243,7 +245,6 @@ class CourseWalker:
         legs = np.full((4, 3), _OFF)
         if stage.reaching and self._part in ("soften", "bend"):
             lifting = self._part == "soften" and self._time < 3.0
-            legs[:2] = _LIFTED  # legs that press would roll the soft body off the beam
             legs[2:] = _LIFTED if lifting else _REACHING
         elif stage.braced and self._part != "release":
             legs[:] = _BRACED

@@ -49,7 +49,7 @@ class Option:
             ValueError: If it cannot be.
         """
         if self.choices:
-            if value not in self.choices:
+            if not isinstance(value, str) or value not in self.choices:
                 raise ValueError(
                     f"{self.name} must be one of {sorted(self.choices)}, got {value!r}"
                 )
