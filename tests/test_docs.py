@@ -8,6 +8,7 @@ import gymnasium as gym
 import pytest
 
 import tca_mj  # noqa: F401  (registers the ids)
+from tca_mj.registry import TASKS
 
 ROOT = Path(__file__).resolve().parent.parent
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
@@ -81,6 +82,18 @@ def test_the_arms_page_has_the_observation_table():
     from tca_mj.envs.arm import OBSERVATION
 
     assert OBSERVATION.markdown() in (ROOT / "docs" / "arm.md").read_text(encoding="utf-8")
+
+
+def test_the_page_of_tasks_has_the_options_of_all():
+    from tca_mj.envs.options import Options, variation_options
+
+    page = (ROOT / "docs" / "tasks.md").read_text(encoding="utf-8")
+    common = Options(variation_options())
+    assert common.markdown() in page
+    for task in TASKS:
+        rows = gym.make(task.id, disable_env_checker=True).unwrapped.options.rows
+        own = Options([row for row in rows if row.name not in common.names])
+        assert f"`{task.id}`:\n\n{own.markdown()}\n" in page
 
 
 def test_the_tetrapods_page_has_the_observation_table():
