@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from tca_mj.agents.tetrapod_gaits import CRAWL, SHIMMY, WALK
 from tca_mj.control import Gait, Thermostat
 from tca_mj.envs.course import OBSERVATION, Places, TetrapodCourse
+from tca_mj.robots.tetrapod import SPINES
 
 Array = NDArray[np.float64]
 
@@ -230,11 +231,10 @@ class CourseWalker:
                     if (still and self._time > 5.0) or self._time > 60.0:
                         self._go_on("hold")
                 elif self._time > 6.0:
+                    # As warm as they are, and no warmer: to contract now would damage them.
+                    self._target = float(seen["TCA temperature"][-SPINES:].mean())
                     self._go_on("harden")
         elif self._part == "harden":
-            if stage.angle is not None and cold > 108.0:
-                change = 0.3 * error * self._dt
-                self._target = float(np.clip(self._target + change, 25.0, self.hottest))
             if cold < self.rigid:
                 self._go_on("release" if stage.angle is not None else "done")
         elif self._part == "release":

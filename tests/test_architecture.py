@@ -36,6 +36,8 @@ LAYER_OF = {
     "shapes": "record",
     "variation": "sim",
     "batch": "sim",
+    "state": "sim",
+    "testing": "agents",
 }
 # Files that only high layers may import, although they themselves see only what is low:
 # figures and recordings share colours, and no physics draws.
