@@ -74,11 +74,11 @@ def play(
     limit = max_duration or np.inf
     if env.spec is not None and env.spec.max_episode_steps is not None:
         limit = min(limit, env.spec.max_episode_steps * told.control_period)
-    named = isinstance(policy, str | Path)
-    acting: Any = actor(policy, env, seed=seed) if named else policy  # before a file is touched
-    if named:
+    acting: Any = policy
+    name = type(policy).__name__
+    if isinstance(policy, str | Path):
+        acting, name = actor(policy, env, seed=seed), str(policy)  # before a file is touched
         acting.reset()
-    name = str(policy) if named else type(policy).__name__
     episode = Episode(
         env if out is None else RecordRerun(env, out / RECORDING), acting, seed=seed, out=out,
         options=options, title=f"{name} in {task}",

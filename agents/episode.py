@@ -52,8 +52,8 @@ class Episode:
             title: What the plot is called, before how it ended.
         """
         self.env, self.policy, self.seed, self.out = env, policy, seed, out
-        self.task: Any = env.unwrapped
-        self.sim = self.task.sim
+        task: Any = env.unwrapped
+        self.task, self.sim = task, task.sim
         self.ending = ""
         self.success = False
         self.total = 0.0  # of the rewards

@@ -44,7 +44,7 @@ class GaitPolicy:
 
     def __post_init__(self) -> None:
         self._thermostat = Thermostat(heat=self.heat, max_power=self.max_power)
-        self._left = (np.arange(self.gait.legs) + 1.0) % 2.0
+        self._left = np.array([1.0, 0.0] * (self.gait.legs // 2), dtype=np.float64)
 
     @classmethod
     def in_task(

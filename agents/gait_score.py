@@ -73,7 +73,7 @@ def run_trial(trial: Trial) -> Headway:
     """Runs an episode. What comes out depends on ``trial`` alone."""
     env = _env(trial.task)
     policy = GaitPolicy.in_task(env, trial.gait, trial.steering)
-    period, tcas = policy.control_period, policy.heat.capacity.size
+    period, tcas = policy.control_period, np.size(policy.heat.capacity)
     cycle = trial.gait.period / period
     first = round(round(trial.settling / trial.gait.period) * cycle)
     steps = first + round(max(1, round(trial.window / trial.gait.period)) * cycle)
