@@ -18,7 +18,7 @@ from typing import Any
 
 from tca_mj.agents.evaluate import EPISODES, METRICS, Evaluation, cell, evaluate, figures, kept
 from tca_mj.agents.policy import SavedPolicy, shipped
-from tca_mj.registry import TASKS
+from tca_mj.registry import TASKS, task_class
 
 ROOT = Path(__file__).resolve().parent.parent
 PAGE, DATA = ROOT / "docs" / "results.md", ROOT / "docs" / "results.json"
@@ -78,18 +78,15 @@ One's own policy is measured by `tca-mj eval POLICY --task TASK`, with `--random
 def cases(tasks: list[str]) -> Iterator[tuple[str, str, str, Evaluation]]:
     """Task, policy and condition, with what is to be run."""
     for task in tasks:
-        gait = any(known.id == task and "gait" in known.kwargs for known in TASKS)
+        finer = task_class(task).finer
         learned = [name for name, path in shipped().items() if SavedPolicy.read(path).task == task]
         for policy in ("scripted", *learned, "random", "off"):
             for condition, settings in CONDITIONS.items():
                 acts = policy not in ("random", "off")
                 if (not acts and condition != "nominal") or (task == COURSE and not acts):
                     continue
-                if not gait and "model" in settings:
+                if settings.get("model", "used") not in ("used", *finer):
                     continue
-                if "MorphModule" in task or "ArmPickPlace" in task:  # nothing varies them
-                    if "randomise" in settings:
-                        continue
                 more = dict(settings)
                 if task == COURSE:
                     more["episodes"] = 1

@@ -21,9 +21,10 @@ import mujoco.batch
 import numpy as np
 from numpy.typing import NDArray
 
+from tca_mj.couple import Inputs, advance, measure, write
 from tca_mj.model.smooth import SmoothBody, Strained
 from tca_mj.model.spines import Spines
-from tca_mj.sim import DIVERGENCE, Drive, Simulation, SimulationDiverged, bias
+from tca_mj.sim import DIVERGENCE, Drive, Simulation, SimulationDiverged
 from tca_mj.tca import CoilSolveError, Pull, TcaBank, TcaMelted, TcaState
 from tca_mj.tca.arrays import row, stacked
 
@@ -113,7 +114,7 @@ class SimulationBatch:
                 errors[i] = error
         return errors
 
-    def _run(self, ids: NDArray[np.int64], inputs: Sequence[Any], updates: int) -> Sequence[int]:
+    def _run(self, ids: NDArray[np.int64], inputs: Sequence[Inputs], updates: int) -> Sequence[int]:
         """The ordinary course of ``step`` for the simulations ``ids``.
 
         Returns:
@@ -168,13 +169,11 @@ class _Every:
         self,
         body: SmoothBody,
         sims: Sequence[Simulation],
-        inputs: Sequence[tuple[Array, Array, NDArray[np.bool_]]],
+        inputs: Sequence[Inputs],
     ) -> None:
         first = sims[0]
         self.sims = sims
-        self.power, self.voltage, self.fan = (
-            np.stack(values) for values in zip(*inputs, strict=True)
-        )
+        self.inputs: Inputs = stacked(inputs)
         self.period, self.steadiness = first.tca_period, first.steadiness
         self.bank: TcaBank = copy(first.bank)
         self.bank.heat = stacked([sim.bank.heat for sim in sims])
@@ -190,40 +189,29 @@ class _Every:
 
     def advance(self, qpos: Array) -> NDArray[np.bool_]:
         """Heats TCAs and spines for a period; where a length has no law, shape (m,)."""
-        strained = self.strained = self.body.at(qpos)
-        length = strained.length + self.offset
-        inside = (length > self.bank.shortest) & (length < self.bank.longest)
+        self.strained, length, inside = measure(self.body, self.bank, qpos, self.offset)
+        motion = self.strained.motion
         astray: NDArray[np.bool_] = np.logical_not(inside.all(axis=-1))
-        motion = strained.motion
         if astray.any():  # is thrown away, and must not stop the others
             length = np.where(inside, length, self.bank.rest_length)
             motion = np.where(astray[:, None, None], self.body.rest, motion)
-        heat = self.tca
-        self.tca, pull = self.bank.advance(heat, self.power, length, self.period)
-        if self.spines.n:
-            before = self.bank.pull(heat, length).tension
-            rise = (pull.tension - before) / self.period
-            self.spines.advance(
-                self.voltage, self.fan, motion,
-                self.gain * pull.tension, self.gain * rise, self.period,
-            )  # fmt: skip
-        self.pull = Pull(self.gain * pull.tension, self.gain * pull.stiffness, pull.length)
+        self.tca, self.pull = advance(
+            self.bank, self.spines, self.tca, self.inputs, length=length, motion=motion,
+            gain=self.gain, period=self.period,
+        )  # fmt: skip
         return astray
 
     def hand_over(
         self, which: NDArray[np.int64], qpos: Array, tendon_length: Array, tendon_slope: Array
     ) -> None:
         """Writes what MuJoCo has to know to the models of the simulations ``which``."""
-        tendon = tendon_length.take(self.sims[0].tendon, axis=-1)
-        constant, slope = bias(self.pull, tendon)
-        tension = np.maximum(self.pull.tension, 0.0)
-        stiffness, reference = self.body.springs(self.strained, tension, tendon_slope, qpos)
-        damping = self.body.damped(self.strained, tension, self.steadiness)
+        writes = write(
+            self.body, self.strained, self.pull, qpos=qpos,
+            tendon_length=tendon_length.take(self.sims[0].tendon, axis=-1),
+            tendon_slope=tendon_slope, steadiness=self.steadiness,
+        )  # fmt: skip
         for k in which:
-            sim = self.sims[k]
-            sim.set_bias(constant[k], slope[k])
-            sim.body.set_springs(stiffness[k], reference[k])
-            sim.body.set_damping(damping[k])
+            self.sims[k].take(row(writes, k))
 
     def settle(self, qpos: Array) -> None:
         """Computes the bodies where they are now, which tasks ask for next."""
@@ -232,7 +220,7 @@ class _Every:
     def give_back(self, k: int) -> None:
         """Makes simulation ``k`` what a step of its own would have made of it."""
         sim, pull = self.sims[k], self.pull
-        sim.power = self.power[k]
+        sim.power = self.inputs.power[k]
         sim.tca = row(self.tca, k)
         sim.pull = Pull(pull.tension[k], pull.stiffness[k], pull.length[k])
         sim.strained = self.strained[k]

@@ -1,17 +1,11 @@
-"""The coupled step: electrical power, heat and tension of the TCAs, motion of the body.
+"""A simulation: a built part with its TCAs and spines, in motion.
 
-The TCAs' law F(l, T) is evaluated once per ``tca_period`` and handed to MuJoCo linearised in the
-length, F + k (l' - l), as a native actuator that MuJoCo evaluates in every physics step. Holding
-the tension constant instead would make a stiff TCA a delayed spring, which oscillates.
+The TCAs' law is evaluated once per ``tca_period`` and handed to MuJoCo linearised; how, and why,
+is in ``tca_mj.couple``.
 
 MuJoCo's tendons are polylines through sites, its bodies chains of hinges. A TCA's length is that
 of the smooth curve that its polyline stands for, and the joints get springs that make the tension
 do the work that this length says: see ``tca_mj.model.smooth``.
-
-MuJoCo leaves a force that is clamped out of its implicit step: a slack TCA has no stiffness. In
-the unloaded shape cold TCAs are just between slack and taut, and the sign of a rounding would
-decide; a first step from rest differs by a tenth between the two. Every TCA therefore pulls
-1e-10 N more than its law, far above any rounding and far below any weight: at rest it is taut.
 """
 
 from collections.abc import Callable
@@ -22,6 +16,7 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from tca_mj.couple import Inputs, Writes, advance, measure, write
 from tca_mj.model.part import Part
 from tca_mj.model.smooth import SmoothBody
 from tca_mj.model.spines import Spines
@@ -36,7 +31,6 @@ from tca_mj.tca import (
 )
 from tca_mj.tca.arrays import floats
 
-_TAUT = 1e-10  # tension added to each TCA's law, so that at rest it is taut [N]
 # Warnings after which MuJoCo has reset the state by itself.
 DIVERGENCE = {
     int(warning): str(warning).rsplit("_", 1)[-1]
@@ -175,7 +169,7 @@ class Simulation:
         self.power = np.zeros(self.n)
         self.strained = self.body.at(data.qpos)
         self.spines.reset(self.strained.motion)
-        self._hand_over(self.bank.pull(self.tca, self.strained.length + self.length_offset))
+        self._hand_over(self._pull(self.tca, self.strained.length + self.length_offset))
         mujoco.mj_forward(model, data)
 
     def keep(self, temperature: ArrayLike) -> NDArray[np.float64]:
@@ -240,7 +234,7 @@ class Simulation:
     def tension(self) -> NDArray[np.float64]:
         """Tension each TCA exerts on the body, shape (n,) [N]; a slack TCA has none.
 
-        It is 1e-10 N above the law's, see the top of this file.
+        It is 1e-10 N above the law's, see ``tca_mj.couple``.
         """
         return 0.0 - self.data.actuator_force[self.actuator]
 
@@ -287,17 +281,20 @@ class Simulation:
             SimulationDiverged: If the state is no longer finite, or a TCA is shorter, longer or
                 hotter than its law holds for.
         """
-        power, voltage, fan = self.checked(power, voltage, fan)
+        inputs = self.checked(power, voltage, fan)
         updates = self.updates(duration)
         model, data = self.model, self.data
-        self.power = power
+        self.power = inputs.power
         for _ in range(updates):
-            self.strained = self.body.at(data.qpos)
-            length = self.strained.length + self.length_offset
-            self._check_length(length)
-            heat = self.tca
+            self.strained, length, inside = measure(
+                self.body, self.bank, data.qpos, self.length_offset
+            )
+            self._check_length(length, inside)
             try:
-                self.tca, pull = self.bank.advance(self.tca, power, length, self.tca_period)
+                self.tca, pull = advance(
+                    self.bank, self.spines, self.tca, inputs, length=length,
+                    motion=self.strained.motion, gain=self.gain, period=self.tca_period,
+                )  # fmt: skip
             except TcaMelted as melted:
                 raise SimulationOverheated(
                     f"{self.tca_names[melted.number]} {melted.why}, at {self.time:.3f} s"
@@ -306,20 +303,13 @@ class Simulation:
                 raise SimulationDiverged(
                     f"the TCAs have no state at {self.time:.3f} s: {error}"
                 ) from error
-            if self.spines.n:
-                before = self.bank.pull(heat, length).tension
-                rise = (pull.tension - before) / self.tca_period
-                self.spines.advance(
-                    voltage, fan, self.strained.motion,
-                    self.gain * pull.tension, self.gain * rise, self.tca_period,
-                )  # fmt: skip
             self._hand_over(pull)
             mujoco.mj_step(model, data, self.substeps)
         self._check()
 
     def checked(
         self, power: ArrayLike, voltage: ArrayLike, fan: ArrayLike
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]]:
+    ) -> Inputs:
         """Power, shape (n,), voltage and fan, shape (spines.n,) each, for ``step``.
 
         Raises:
@@ -330,7 +320,7 @@ class Simulation:
             raise ValueError(f"power must have shape ({self.n},), got {power.shape}")
         if not (np.isfinite(power).all() and (power >= 0.0).all()):
             raise ValueError(f"power must be finite and at least 0 W, got {power}")
-        return power, *self.spines.checked(voltage, fan)
+        return Inputs(power, *self.spines.checked(voltage, fan))
 
     def updates(self, duration: float) -> int:
         """How many updates of the TCAs a duration [s] takes.
@@ -346,24 +336,32 @@ class Simulation:
             )
         return updates
 
+    def _pull(self, tca: TcaState, length: NDArray[np.float64]) -> Pull:
+        pull = self.bank.pull(tca, length)
+        return Pull(self.gain * pull.tension, self.gain * pull.stiffness, pull.length)
+
     def _hand_over(self, pull: Pull) -> None:
-        """Gives MuJoCo the law F + k (l' - l) and the joints the springs that go with it."""
-        pull = Pull(self.gain * pull.tension, self.gain * pull.stiffness, pull.length)
+        """Gives MuJoCo the law of the TCAs, and the joints the springs that go with it."""
         self.pull = pull
         self._locate()
-        self.set_bias(*bias(pull, self.data.ten_length[self.tendon]))
-        tension = np.maximum(pull.tension, 0.0)
-        self.body.support(self.data, self.strained, tension)
-        self.body.steady(self.strained, tension, self.steadiness)
+        data = self.data
+        self.take(
+            write(
+                self.body, self.strained, pull, qpos=data.qpos,
+                tendon_length=data.ten_length[self.tendon], tendon_slope=data.ten_J,
+                steadiness=self.steadiness,
+            )
+        )  # fmt: skip
 
-    def set_bias(self, constant: NDArray[np.float64], slope: NDArray[np.float64]) -> None:
-        """Writes what ``bias`` computes, shape (n,) each, to the model."""
+    def take(self, writes: Writes) -> None:
+        """Writes what ``tca_mj.couple.write`` computes to the model."""
         prm = self.model.actuator_biasprm
-        prm[self.actuator, 0] = constant
-        prm[self.actuator, 1] = slope
+        prm[self.actuator, 0] = writes.constant
+        prm[self.actuator, 1] = writes.slope
+        self.body.set_springs(writes.stiffness, writes.reference)
+        self.body.set_damping(writes.damping)
 
-    def _check_length(self, length: NDArray[np.float64]) -> None:
-        inside = (length > self.bank.shortest) & (length < self.bank.longest)
+    def _check_length(self, length: NDArray[np.float64], inside: NDArray[np.bool_]) -> None:
         if not inside.all():
             self._check()
             i = int(np.argmin(inside))
@@ -382,18 +380,6 @@ class Simulation:
                 f"the state diverged at {data.time:.3f} s ({names}); a smaller timestep or less"
                 " power may help"
             )
-
-
-def bias(
-    pull: Pull, tendon_length: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Constant [N] and slope [N/m] of MuJoCo's affine law of its tendon's length, (..., n) each.
-
-    Args:
-        pull: The law of the TCAs, about their present lengths.
-        tendon_length: Present lengths of the tendons, shape (..., n) [m].
-    """
-    return -(pull.tension + _TAUT) + pull.stiffness * tendon_length, -pull.stiffness
 
 
 def _bank(specs: tuple[TcaSpec, ...], law: Literal["rod", "surface"]) -> TcaBank:

@@ -37,6 +37,7 @@ LAYER_OF = {
     "variation": "sim",
     "batch": "sim",
     "state": "sim",
+    "couple": "sim",
     "testing": "agents",
 }
 # Files that only high layers may import, although they themselves see only what is low:

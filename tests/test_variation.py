@@ -112,7 +112,7 @@ def test_the_gain_scales_tension_and_slope(sim, nominal):
         length = sim.length
         state = sim.bank.rest()
         state.temperature[:] = hot
-        sim._hand_over(sim.bank.pull(state, length))
+        sim._hand_over(sim._pull(state, length))
         mujoco.mj_forward(sim.model, sim.data)
         pulls.append((sim.pull, sim.tension))
     (one, felt), (more, felt_more) = pulls

@@ -291,10 +291,6 @@ class SmoothBody:
         lead = damping.shape[:-2]
         return damping.reshape(*lead, -1)[..., self._held]
 
-    def steady(self, strained: Strained, tension: Array, time: float) -> None:
-        """Keeps taut tendons from chattering: sets the damping of ``damped``, shape (n,)."""
-        self.set_damping(self.damped(strained, tension, time))
-
     def set_damping(self, damping: Array) -> None:
         """Writes what ``damped`` computes, shape (j,), to the model."""
         self._model.dof_damping[self._dof] = damping
