@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 PUSH = replace(WALK, offset=(0.0,) * 4)
 """The walk with both legs of a pair together, where the body does not rest on its legs."""
 
-HURRY = replace(SHIMMY, period=11.5, hot=(170.0, 150.0, 170.0))
+HURRY = replace(SHIMMY, period=14.0, hot=(172.0,) * 3)
 """The shimmy with stronger strokes: the beam is wider than the one of its task."""
 
 STEP = Gait(
