@@ -1,7 +1,6 @@
 """An episode under way: what is seen of it, filmed, recorded and summed up, however it ends."""
 
 import json
-import os
 import time
 from collections import defaultdict
 from collections.abc import Callable, Iterator, Mapping
@@ -17,6 +16,7 @@ from tqdm import tqdm
 from tca_mj.agents.policy import Policy
 from tca_mj.envs.task import Headway, how_it_ended
 from tca_mj.envs.wrappers import RecordRerun
+from tca_mj.files import write_whole
 from tca_mj.film import Film
 from tca_mj.machine import machine, versions
 from tca_mj.plots import rollout_plot
@@ -193,9 +193,7 @@ class Episode:
         if self.out is not None:
             self.wall["recording"] = self._recorded()
             text = json.dumps(summary(), indent=2, ensure_ascii=False) + "\n"
-            beside = self.out / f".{SUMMARY}"
-            beside.write_text(text, encoding="utf-8")
-            os.replace(beside, self.out / SUMMARY)
+            write_whole(self.out / SUMMARY, text.encode())
 
     def _begin_film(self, speed: float) -> None:
         """Films the first frame; without OpenGL or an encoder it says so and goes on without."""

@@ -24,8 +24,9 @@ from tqdm import tqdm
 import tca_mj  # noqa: F401  (registers the tasks in a new process)
 from tca_mj.agents.actors import NAMES, actor, best_of
 from tca_mj.agents.design import robot_of
-from tca_mj.agents.policy import find, write_whole
+from tca_mj.agents.policy import find
 from tca_mj.envs.task import how_it_ended
+from tca_mj.files import write_whole
 from tca_mj.machine import machine, versions
 from tca_mj.registry import task_class
 

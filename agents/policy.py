@@ -14,7 +14,6 @@ No file is unpickled, and none needs torch or Stable-Baselines3.
 
 import io
 import json
-import os
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from importlib.resources import files
@@ -27,6 +26,7 @@ from numpy.typing import NDArray
 from tca_mj.agents.gait_policy import GaitPolicy
 from tca_mj.agents.network import Network
 from tca_mj.control import Gait
+from tca_mj.files import write_whole
 
 FORMAT = 1
 KINDS = {"gait": ".json", "network": ".npz", "residual": ".npz"}
@@ -280,18 +280,6 @@ def shipped() -> dict[str, Path]:
     folder = Path(str(files("tca_mj.agents"))) / "policies"
     found = sorted(folder.glob("*")) if folder.is_dir() else []
     return {path.stem: path for path in found if path.suffix in KINDS.values()}
-
-
-def write_whole(path: Path, content: bytes) -> Path:
-    """Replaces a file in one go, after its content has reached the disk."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    beside = path.with_name(f".{path.name}.tmp")
-    with beside.open("wb") as file:
-        file.write(content)
-        file.flush()
-        os.fsync(file.fileno())
-    os.replace(beside, path)
-    return path
 
 
 def _gait(row: Mapping[str, Any]) -> Gait:

@@ -13,7 +13,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from tca_mj.agents.policy import write_whole
+from tca_mj.files import write_whole
 from tca_mj.machine import machine, versions
 
 RUN, STATE, CURVE, TENSORBOARD = "run.json", "state.pkl", "curve.csv", "tensorboard"

@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from tca_mj.agents.evaluate import Evaluation, evaluate
-from tca_mj.agents.policy import write_whole
+from tca_mj.files import write_whole
 from tca_mj.machine import machine, versions
 
 TRIALS, RESULT = "trials", "result.json"

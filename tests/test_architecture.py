@@ -25,6 +25,7 @@ STACK = ["door", "assets", *LAYERS, "cli"]
 LAYER_OF = {
     "__init__": "door",
     "registry": "door",
+    "files": "door",
     "machine": "door",
     "bench": "agents",
     "bench_vector": "agents",
