@@ -25,6 +25,7 @@ import tca_mj  # noqa: F401  (registers the tasks in a new process)
 from tca_mj.agents.actors import NAMES, actor, best_of
 from tca_mj.agents.design import robot_of
 from tca_mj.agents.policy import find
+from tca_mj.agents.rollout import rollout
 from tca_mj.envs.task import how_it_ended
 from tca_mj.files import write_whole
 from tca_mj.machine import machine, versions
@@ -141,22 +142,22 @@ def run_episode(evaluation: Evaluation, seed: int) -> dict[str, Any]:
     env = evaluation.make()
     try:
         policy = actor(evaluation.policy, env, seed=seed)
-        observation, info = env.reset(seed=seed, options=evaluation.options)
-        policy.reset()
         task: Any = env.unwrapped
-        sim, start = task.sim, task.headway()
-        total, steps, ended, truncated = 0.0, 0, False, False
+        sim, start, total, steps = task.sim, None, 0.0, -1
         hottest, tightest = -np.inf, 0.0
-        while not ended:
-            observation, reward, terminated, truncated, info = env.step(policy.act(observation))
-            total, steps, ended = total + float(reward), steps + 1, terminated or truncated
+        for step in rollout(env, policy, seed=seed, options=evaluation.options):
+            total, steps = total + step.reward, steps + 1
+            if not steps:
+                start = task.headway()
+                continue
             hottest = max(hottest, float(sim.temperature.max()))
             tightest = max(tightest, float(sim.tension.max()))
+        info, truncated = step.info, step.truncated
         whole = bool(truncated and "truncation_reason" not in info)
         row = {
             "seed": seed,
             "steps": steps,
-            "ending": how_it_ended(terminated, truncated, info) or "",
+            "ending": how_it_ended(step.terminated, truncated, info) or "",
             "return": total,
             "success": bool(info["success"] or (whole and task.legs)),
             "duration": float(sim.time),

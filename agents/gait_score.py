@@ -3,12 +3,14 @@
 import functools
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import islice
 from typing import Any
 
 import gymnasium as gym
 import numpy as np
 
 from tca_mj.agents.gait_policy import GaitPolicy
+from tca_mj.agents.rollout import rollout
 from tca_mj.control import Gait
 
 # Where penalties begin, somewhat within what is demanded of a gait, and how much they cost. The
@@ -78,16 +80,16 @@ def run_trial(trial: Trial) -> Headway:
     first = round(round(trial.settling / trial.gait.period) * cycle)
     steps = first + round(max(1, round(trial.window / trial.gait.period)) * cycle)
     options = {"randomise": trial.randomise, "direction": 0.0}
-    observation, info = env.reset(seed=trial.seed, options=options)
-    begin, hottest, tightest, done = info, 0.0, 0.0, 0
-    for done in range(1, steps + 1):
-        observation, _, terminated, truncated, info = env.step(policy.act(observation))
+    episode = enumerate(rollout(env, policy, seed=trial.seed, options=options))
+    _, step = next(episode)
+    info = begin = step.info
+    hottest, tightest, done = 0.0, 0.0, 0
+    for done, step in islice(episode, steps):
+        info = step.info
         hottest = max(hottest, float(info["temperature"][:tcas].max()))
         tightest = max(tightest, float(info["tension"][:tcas].max()))
         if done == first:
             begin = info
-        if terminated or truncated:
-            break
     # An early end leaves less distance for the same time; the power is that of the time walked.
     judged = (steps - first) * period
     walked = max(done - first, 1) * period

@@ -29,6 +29,7 @@ from tca_mj.agents.config import OnPolicy, TrainConfig
 from tca_mj.agents.export import exported
 from tca_mj.agents.learning_env import LearningEnv
 from tca_mj.agents.policy import Origin, Policy, SavedPolicy
+from tca_mj.agents.rollout import rollout
 from tca_mj.agents.runs import CURVE, LIBRARIES, RunFolder
 from tca_mj.agents.sb3_env import TaskVecEnv
 from tca_mj.agents.search import first_gait
@@ -305,19 +306,14 @@ def episode(
     Returns:
         ``return``, ``length``, ``success``, and the sum of each reward term.
     """
-    policy.reset()
-    observation, info = env.reset(seed=seed, options=options or None)
-    each()
-    sums, over = {"return": 0.0, "length": 0.0, "success": 0.0}, False
-    while not over:
-        observation, reward, terminated, truncated, info = env.step(policy.act(observation))
+    sums = {"return": 0.0, "length": -1.0, "success": 0.0}
+    for step in rollout(env, policy, seed=seed, options=options):
         each()
-        sums["return"] += float(reward)
+        sums["return"] += step.reward
         sums["length"] += 1.0
-        for name, term in info.get("reward_terms", {}).items():
+        for name, term in step.info.get("reward_terms", {}).items():
             sums[f"term_{name}"] = sums.get(f"term_{name}", 0.0) + float(term)
-        over = terminated or truncated
-    return sums | {"success": float(info.get("success", info.get("is_success", False)))}
+    return sums | {"success": float(step.info["success"])}
 
 
 def _learner(config: TrainConfig, env: VecNormalize) -> BaseAlgorithm:
