@@ -21,8 +21,15 @@ Array = NDArray[np.float64]
 PUSH = replace(WALK, offset=(0.0,) * 4)
 """The walk with both legs of a pair together, where the body does not rest on its legs."""
 
-HURRY = replace(SHIMMY, period=14.0, hot=(172.0,) * 3)
-"""The shimmy with stronger strokes: the beam is wider than the one of its task."""
+HURRY = (
+    replace(SHIMMY, period=11.5, hot=(170.0, 150.0, 170.0)),
+    replace(SHIMMY, period=14.0, hot=(172.0,) * 3),
+    replace(
+        SHIMMY, period=11.6, start=(0.02, 0.24, 0.5), hot=(172.0, 170.0, 165.0), warm=(25.0,) * 3
+    ),
+)
+"""The shimmy with stronger strokes: the beam is wider than the one of its task. How well the body
+embraces it differs from robot to robot, and which of these gets on."""
 
 STEP = Gait(
     period=4.0, offset=(0.0, 0.5, 0.5, 0.0), start=(0.0, 0.5, 0.5), duty=(0.5,) * 3,
@@ -43,7 +50,8 @@ class Go:
 
     Attributes:
         name: Name of the stage.
-        gait: Whose temperatures the legs follow.
+        gait: Whose temperatures the legs follow; several are tried in turn where one does not get
+            on.
         until: Where the stage ends, along x [m].
         patience: Time without headway after which the stage ends wherever the body is [s].
         steers: Deviation of the heading up to which nothing is done; beyond it the legs of one side
@@ -52,7 +60,7 @@ class Go:
     """
 
     name: str
-    gait: Gait
+    gait: Gait | tuple[Gait, ...]
     until: float
     patience: float = math.inf
     steers: float | None = None
@@ -95,7 +103,7 @@ def stages(places: Places) -> tuple[Go | Bend, ...]:
             steers=0.0,
         ),  # fmt: skip
         Bend(name="clamp", angle=np.radians(213.0), reaching=True),
-        Go(name="shimmy", gait=HURRY, until=places.beam_end - 0.005, patience=120.0),
+        Go(name="shimmy", gait=HURRY, until=places.beam_end - 0.005, patience=200.0),
         # On until the rear spine has left the beam; the front legs clamp its lower end by then.
         Go(
             name="step off", gait=HURRY, until=places.beam_end + station - 0.015, patience=60.0,
@@ -109,7 +117,7 @@ def stages(places: Places) -> tuple[Go | Bend, ...]:
             for angle in (165.0, 130.0, 97.0, 97.0, 97.0)
         ),  # fmt: skip
         Go(name="walk on", gait=WALK, until=places.target, steers=0.0),
-        Bend(name="lie down", angle=None),
+        Bend(name="lie down", angle=None, steps=STEP),
     )
 
 
@@ -122,6 +130,7 @@ class CourseWalker:
     soft = 116.0  # spines are hot enough to be bent [°C]
     rigid = 75.0  # spines are cold enough to be let go [°C]
     hottest = 172.0  # temperature that no TCA is to exceed [°C]
+    stalled = 35.0  # time without headway after which another gait is tried [s]
 
     def __init__(self, env: TetrapodCourse) -> None:
         """A controller for ``env``, of which it uses limits and places, not the state."""
@@ -149,6 +158,7 @@ class CourseWalker:
         self._time = 0.0  # in this stage, or this part of it
         self._part = "soften"
         self._best, self._since = -math.inf, 0.0  # foremost place in this stage, and when
+        self._choice, self._tried = 0, 0.0  # which gait of several, and since when
         self._integral = 0.0
         self._target = 25.0  # of the spines' TCAs
         self._angle: float | None = None
@@ -179,14 +189,18 @@ class CourseWalker:
         if isinstance(stage, Go):
             x = float(seen["position"][0])
             if x > self._best + 2e-3:
-                self._best, self._since = x, self._time
+                self._best, self._since, self._tried = x, self._time, self._time
+            elif self._time - self._tried > self.stalled:
+                self._choice, self._tried = self._choice + 1, self._time
             return x >= stage.until or self._time - self._since > stage.patience
         if stage.enough is not None and self._time == 0.0:
             return float(seen["body angle"][0]) <= stage.enough
         return self._part == "done"
 
     def _walk(self, stage: Go, seen: dict[str, Array]) -> Array:
-        legs = stage.gait.temperature(self._time / stage.gait.period).reshape(4, 3)
+        gaits = stage.gait if isinstance(stage.gait, tuple) else (stage.gait,)
+        gait = gaits[self._choice % len(gaits)]
+        legs = gait.temperature(self._time / gait.period).reshape(4, 3)
         if stage.steers is not None:
             w, _, _, z = seen["orientation"]
             away = 2.0 * np.arctan2(z, w) + 3.0 * seen["position"][1]
@@ -214,6 +228,7 @@ class CourseWalker:
         elif self._part in ("bend", "hold"):
             voltage = boost
             if stage.angle is None:
+                stepping = True  # or the feet hold the body as it is
                 if self._time > 15.0:
                     self._go_on("harden")
             else:
