@@ -6,8 +6,11 @@
 Each check of ``CHECKS`` takes an id and raises an ``AssertionError`` that says what is not kept.
 """
 
+import hashlib
 import math
 import pickle
+import subprocess
+import sys
 import warnings
 from collections.abc import Callable
 from typing import Any
@@ -204,6 +207,42 @@ def check_vector(id: str) -> None:
     together.close()
 
 
+def check_actions(id: str) -> None:
+    """An action of another shape, not finite or out of bounds is refused."""
+    task = _task(id)
+    task.reset(seed=0)
+    still = task.action.still
+    for wrong in (still[:-1], np.append(still, 0.0), 0.0 * still + 1.1, np.nan * still, "left"):
+        try:
+            task.step(wrong)
+        except ValueError as error:
+            assert "action must be" in str(error), error
+        else:
+            raise AssertionError(f"the action {wrong!r} is not refused")
+    for name, argument in (("render_mode", "human"), ("camera", "nowhere"), ("size", (0, 9))):
+        try:
+            task_class(id)(**{**find_task(id).kwargs, name: argument})
+        except ValueError as error:
+            assert name in str(error), error
+        else:
+            raise AssertionError(f"{name} = {argument!r} is not refused")
+
+
+def check_process(id: str) -> None:
+    """Another process, where nothing happened before, gives the same bits."""
+    text = f"from tca_mj.testing import fingerprint; print(fingerprint({id!r}))"
+    done = subprocess.run(
+        [sys.executable, "-c", f"import sys; sys.path[:] = {sys.path!r}; {text}"],
+        capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.stdout.strip() == fingerprint(id), f"other bits in a fresh process {done.stderr}"
+
+
+def fingerprint(id: str) -> str:
+    """A hash of all that a short episode returns."""
+    return hashlib.sha256(repr(_rollout(_task(id), seed=11)).encode()).hexdigest()
+
+
 def check_divergence(id: str) -> None:
     """A state that is not finite ends the episode with a reason, within the space."""
     task = _task(id)
@@ -219,6 +258,7 @@ def check_divergence(id: str) -> None:
 
 def check_pictures(id: str) -> None:
     """Where there is OpenGL a picture has the size that was asked for, and is not one colour."""
+    assert _task(id).render() is None, "there is a picture without a render mode"
     task = _task(id, render_mode="rgb_array", size=(64, 48))
     task.reset(seed=0)
     try:
@@ -239,6 +279,8 @@ CHECKS: dict[str, Callable[[str], None]] = {
     "copies": check_copies,
     "state": check_state,
     "vector": check_vector,
+    "actions": check_actions,
+    "process": check_process,
     "divergence": check_divergence,
     "pictures": check_pictures,
 }
