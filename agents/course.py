@@ -76,7 +76,8 @@ class Bend:
         angle: Bend from rail to rail [rad]; None is the memorised shape, which needs no TCA.
         steps: Gait of the legs while the body bends, so that friction does not hold it.
         braced: Whether the legs curl inwards from beginning to end, which opens the body.
-        reaching: Whether the rear legs reach forward while the body is soft, clear of the desk.
+        reaching: Whether the rear legs reach forward while the body is soft, clear of the desk;
+            later all legs walk, until the body is bent.
         enough: Bend up to which the stage is left out; None: never [rad].
     """
 
@@ -261,6 +262,8 @@ class CourseWalker:
         if stage.reaching and self._part in ("soften", "bend"):
             lifting = self._part == "soften" and self._time < 3.0
             legs[2:] = _LIFTED if lifting else _REACHING
+            if self._part == "bend" and self._time > 4.0:  # they shake the body level
+                legs = WALK.temperature(self._time / WALK.period).reshape(4, 3)
         elif stage.braced and self._part != "release":
             legs[:] = _BRACED
         elif stepping and stage.steps is not None:
