@@ -61,8 +61,8 @@ TASKS = {
     "shimmy": GaitTask(bend=math.radians(215.0), speed=0.75e-3, beam=0.12, yaw_range=0.005),
 }
 
-# Updates of the TCAs in a control step, at least. With a single one the searched walk is 2.3 %
-# faster than with an update in every physics step, with four 0.3 %: scripts/tetrapod_contacts.py.
+# Updates of the TCAs in a control step, at least. With a single one the scripted walk is 1.4 %
+# faster, with one in every physics step 0.2 % slower or less: scripts/tetrapod_contacts.py.
 _UPDATES = 4
 _SETTLING = 0.5  # time in which the robot comes to rest after it is put down [s]
 _UPRIGHT = 0.5  # cosine of the tilt from which on it has fallen over

@@ -4,6 +4,8 @@ from pathlib import Path
 
 import pytest
 
+from tca_mj.envs.morph import OBSERVATION, MorphModule
+from tca_mj.envs.task import Verdict
 from tca_mj.registry import TASKS
 from tca_mj.testing import CHECKS, check_task
 
@@ -23,30 +25,36 @@ def test_a_task_keeps_what_tasks_have_to(id, check):
     CHECKS[check](id)
 
 
-def test_what_is_not_kept_is_said(monkeypatch):
-    """A planted error in each of four places is found by the check of that name."""
-    from tca_mj.envs.morph import MorphModule
+def planted_reward(self, drive, harmed):
+    return Verdict(terms={"bonus": 1.0})
 
-    id = "TCA/MorphModule-v0"
-    judge, prepare = MorphModule.judge, MorphModule.prepare
 
-    def unstable(self, setup):
-        prepare(self, setup)
-        self.target += 1e-9 * id_of_episode.pop()
+def planted_start(self, setup):
+    PREPARE(self, setup)
+    PREPARED.append(0)
+    self.target -= 1e-6 * len(PREPARED)  # depends on how many episodes there were
 
-    id_of_episode = list(range(1000))
-    for name, attribute, planted in (
-        ("tables", "details", lambda self: {"time": self.sim.time, "energy": 0.0}),
-        ("reward", "energy_price", 0.02),
-        ("seeds", "prepare", unstable),
-        ("state", "_episode", lambda self: {}),
-    ):
-        with monkeypatch.context() as patch:
-            patch.setattr(MorphModule, attribute, planted)
-            if name == "reward":
-                patch.setattr(MorphModule, "judge", lambda self, drive, harmed: judge(
-                    self, drive, harmed).__class__(terms={"more": 1.0}))  # fmt: skip
-            with pytest.raises((AssertionError, AttributeError, TypeError)):
-                CHECKS[name](id)
+
+PREPARE, PREPARED = MorphModule.prepare, []
+
+
+@pytest.mark.parametrize(
+    ("check", "attribute", "planted", "said"),
+    [
+        ("tables", "observe", lambda self: dict.fromkeys(OBSERVATION.slices, -9.0), "out of"),
+        ("tables", "_info", lambda self, success: {"time": 0.0}, "info lacks"),
+        ("reward", "judge", planted_reward, "terms are not those of the class"),
+        ("seeds", "prepare", planted_start, "the same seed gives other bits"),
+        ("state", "_episode", lambda self: {}, "a state that was taken back leads elsewhere"),
+    ],
+)
+def test_what_is_not_kept_is_said(monkeypatch, check, attribute, planted, said):
+    """A planted error is found, and by what it breaks."""
+    monkeypatch.setattr(MorphModule, attribute, planted)
+    with pytest.raises(AssertionError, match=said):
+        CHECKS[check]("TCA/MorphModule-v0")
+
+
+def test_a_task_that_does_not_exist_is_no_task():
     with pytest.raises(ValueError, match="task must be one of"):
         check_task("TCA/Nothing-v0")
