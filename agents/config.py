@@ -4,8 +4,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from tca_mj.checks import require_count, require_positive
 from tca_mj.registry import task_class
-from tca_mj.rod.beam import require_count, require_positive
 
 ALGORITHMS = ("ppo", "sac", "td3")
 

@@ -28,10 +28,10 @@ from tca_mj.agents.gait_score import Headway, Reference, Trial, run_trial, score
 from tca_mj.agents.gait_space import GaitSpace
 from tca_mj.agents.policy import Origin, SavedPolicy, find
 from tca_mj.agents.runs import CURVE, LIBRARIES, RunFolder
+from tca_mj.checks import require_count
 from tca_mj.control import Gait
 from tca_mj.machine import versions
 from tca_mj.registry import task_class
-from tca_mj.rod.beam import require_count
 
 TROT = (0.5, 0.0, 0.0, 0.5)  # offsets of four legs, diagonal ones together
 BEST, LAST = "best.json", "last.json"

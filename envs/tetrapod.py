@@ -63,7 +63,7 @@ TASKS = {
 
 # Updates of the TCAs in a control step, at least. With a single one the scripted walk is 1.4 %
 # faster, with one in every physics step 0.2 % slower or less: scripts/tetrapod_contacts.py.
-_UPDATES = 4
+_UPDATES = 2
 _SETTLING = 0.5  # time in which the robot comes to rest after it is put down [s]
 _UPRIGHT = 0.5  # cosine of the tilt from which on it has fallen over
 _SUNK = 12e-3  # depth below its first height at which it has fallen off the beam [m]

@@ -9,9 +9,9 @@ import gymnasium as gym
 from gymnasium.core import ActType, ObsType
 from gymnasium.utils import RecordConstructorArgs
 
+from tca_mj.checks import require_count, require_positive
 from tca_mj.envs.task import how_it_ended
 from tca_mj.record import Recorder
-from tca_mj.rod.beam import require_count, require_positive
 
 
 class RecordRerun(gym.Wrapper[ObsType, ActType, ObsType, ActType], RecordConstructorArgs):

@@ -30,8 +30,8 @@ import rerun
 import rerun.blueprint as layout
 from numpy.typing import NDArray
 
+from tca_mj.checks import require_count, require_positive
 from tca_mj.plots import series_colours, temperature_colour
-from tca_mj.rod.beam import require_count, require_positive
 from tca_mj.shapes import body_paths, extent, ground_height, moving_bodies, rgba_bytes, shapes
 
 QUANTITIES = {

@@ -16,6 +16,7 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from tca_mj.checks import floats
 from tca_mj.couple import Inputs, Writes, advance, measure, write
 from tca_mj.model.part import Part
 from tca_mj.model.smooth import SmoothBody
@@ -29,7 +30,6 @@ from tca_mj.tca import (
     TcaSpec,
     TcaState,
 )
-from tca_mj.tca.arrays import floats
 
 # Warnings after which MuJoCo has reset the state by itself.
 DIVERGENCE = {

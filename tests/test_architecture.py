@@ -26,6 +26,7 @@ LAYER_OF = {
     "__init__": "door",
     "registry": "door",
     "files": "door",
+    "checks": "door",
     "machine": "door",
     "bench": "agents",
     "bench_vector": "agents",
@@ -64,7 +65,7 @@ LOWEST = {
 # Third-party packages that belong to single files or packages instead: where, and nowhere else.
 ONLY_IN = {"matplotlib": {"plots", "validation"}}
 # What a file may import although its layer may not.
-BESIDES = {"registry": {"gymnasium"}}
+BESIDES = {"registry": {"gymnasium"}, "checks": {"numpy"}}
 
 
 def source_files() -> dict[str, Path]:

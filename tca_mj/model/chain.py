@@ -18,7 +18,8 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from tca_mj.rod.beam import BeamSpec, require_count
+from tca_mj.checks import require_count
+from tca_mj.rod.beam import BeamSpec
 from tca_mj.rod.lie import quaternion_exp, quaternion_matrix
 
 Motion = Literal["stretch", "bend_x", "bend_y", "twist"]

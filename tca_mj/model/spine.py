@@ -4,8 +4,9 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
+from tca_mj.checks import require_count, require_positive
 from tca_mj.model.chain import Chain, Motion
-from tca_mj.rod.beam import require_count, require_positive, torsion_constant
+from tca_mj.rod.beam import torsion_constant
 from tca_mj.smp import HeaterSpec, SpineSpec
 
 # Shear modulus over Young's modulus, at any temperature: Poisson's ratio 0.35 when glassy, 0.5 when

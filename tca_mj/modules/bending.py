@@ -3,10 +3,11 @@
 import math
 from dataclasses import dataclass, field, replace
 
+from tca_mj.checks import require_count, require_positive
 from tca_mj.model.chain import beam
 from tca_mj.model.part import Part, new_spec
 from tca_mj.model.tendon import route_passes, route_tca
-from tca_mj.rod.beam import BeamSpec, require_count, require_positive
+from tca_mj.rod.beam import BeamSpec
 from tca_mj.routes import leg_length, parallel
 from tca_mj.tca import CATALOGUE, TcaSpec
 from tca_mj.tca.embedding import SILICONE_DENSITY, silicone_body

@@ -8,11 +8,12 @@ and the fingers open. Cold, they close and hold an object without power.
 import math
 from dataclasses import dataclass, field, replace
 
+from tca_mj.checks import require_count, require_positive
 from tca_mj.model.chain import Chain, beam
 from tca_mj.model.part import Part, new_spec
 from tca_mj.model.tendon import Pass, route_tca
 from tca_mj.modules.bending import SILICONE_YOUNG
-from tca_mj.rod.beam import BeamSpec, require_count, require_positive
+from tca_mj.rod.beam import BeamSpec
 from tca_mj.routes import UTurn, leg_length
 from tca_mj.tca import CATALOGUE, TcaSpec
 from tca_mj.tca.embedding import SILICONE_DENSITY, silicone_body

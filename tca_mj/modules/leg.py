@@ -6,10 +6,11 @@ from typing import Any
 
 import mujoco
 
+from tca_mj.checks import require_count, require_positive
 from tca_mj.model.chain import Chain, Motion, beam
 from tca_mj.model.part import Part, new_spec
 from tca_mj.model.tendon import route_passes, route_tca
-from tca_mj.rod.beam import BeamSpec, Outline, require_count, require_positive
+from tca_mj.rod.beam import BeamSpec, Outline
 from tca_mj.routes import Helix, leg_length
 from tca_mj.tca import CATALOGUE, TcaSpec
 

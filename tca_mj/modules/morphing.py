@@ -11,11 +11,12 @@ from dataclasses import dataclass, field
 
 import mujoco
 
+from tca_mj.checks import require_count, require_positive
 from tca_mj.model.chain import Chain, Motion, beam
 from tca_mj.model.part import Part, new_spec
 from tca_mj.model.spine import route_spine
 from tca_mj.model.tendon import route_passes, route_tca
-from tca_mj.rod.beam import BeamSpec, Outline, require_count, require_positive
+from tca_mj.rod.beam import BeamSpec, Outline
 from tca_mj.routes import UTurn
 from tca_mj.smp import HeaterSpec, SpineSpec
 from tca_mj.smp.lumped import TUBE_DIAMETER, sheathed

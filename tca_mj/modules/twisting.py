@@ -3,11 +3,12 @@
 import math
 from dataclasses import dataclass, field, replace
 
+from tca_mj.checks import require_count, require_positive
 from tca_mj.model.chain import beam
 from tca_mj.model.part import Part, new_spec
 from tca_mj.model.tendon import route_passes, route_tca
 from tca_mj.modules.bending import silicone_cylinder
-from tca_mj.rod.beam import BeamSpec, require_count, require_positive
+from tca_mj.rod.beam import BeamSpec
 from tca_mj.routes import Helix, Route, UTurn, leg_length
 from tca_mj.tca import CATALOGUE, TcaSpec
 from tca_mj.tca.embedding import silicone_body

@@ -9,11 +9,11 @@ from dataclasses import dataclass, field
 import mujoco
 import numpy as np
 
+from tca_mj.checks import require_positive
 from tca_mj.model.part import Part, new_spec
 from tca_mj.modules.bending import BendingSpec, bending_module
 from tca_mj.modules.finger import FingerPairSpec, finger_pair
 from tca_mj.modules.twisting import TwistingSpec, twisting_module
-from tca_mj.rod.beam import require_positive
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)

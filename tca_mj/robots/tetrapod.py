@@ -15,12 +15,13 @@ from typing import Any
 
 import mujoco
 
+from tca_mj.checks import require_count, require_positive
 from tca_mj.model.chain import Chain, Motion, beam
 from tca_mj.model.part import Part, new_spec
 from tca_mj.model.spine import lumped_torsion, route_spine
 from tca_mj.model.tendon import Pass, RoutedTca, route_tca
 from tca_mj.modules.leg import LegSpec, continuum_leg
-from tca_mj.rod.beam import BeamSpec, Outline, require_count, require_positive
+from tca_mj.rod.beam import BeamSpec, Outline
 from tca_mj.routes import Helix, leg_length
 from tca_mj.smp import HeaterSpec, SpineSpec
 from tca_mj.smp.lumped import in_tube

@@ -1,10 +1,10 @@
 """What a soft beam is made of: section, stiffness, mass and reference shape."""
 
-import math
 from dataclasses import dataclass
-from numbers import Integral, Real
 
 import numpy as np
+
+from tca_mj.checks import require_positive
 
 
 @dataclass(frozen=True, slots=True)
@@ -195,27 +195,3 @@ def torsion_constant(width: float, height: float) -> float:
     n = np.arange(1, 40, 2, dtype=np.float64)
     series = np.sum(np.tanh(n * np.pi * longer / (2.0 * shorter)) / n**5)
     return float(longer * shorter**3 * (1 / 3 - 64.0 / np.pi**5 * shorter / longer * series))
-
-
-def require_positive(**values: float) -> None:
-    """Checks fields of a spec by name.
-
-    Raises:
-        ValueError: If one of them is no number, not finite or not above 0.
-    """
-    for field, value in values.items():
-        if not (isinstance(value, Real) and math.isfinite(value) and value > 0.0):
-            raise ValueError(f"{field} must be finite and above 0, got {value!r}")
-
-
-def require_count(**values: int) -> None:
-    """Checks fields of a spec that count something.
-
-    Raises:
-        ValueError: If one of them is no whole number or below 1.
-    """
-    for field, value in values.items():
-        if not isinstance(value, Integral):
-            raise ValueError(f"{field} must be a whole number, got {value!r}")
-        if value < 1:
-            raise ValueError(f"{field} must be at least 1, got {value!r}")

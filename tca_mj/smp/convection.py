@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from scipy.optimize import brentq
 
-from tca_mj.rod.beam import require_positive
+from tca_mj.checks import require_positive
 
 _ZERO = 273.15  # 0 °C [K]
 _STEFAN_BOLTZMANN = 5.670374e-8  # [W/(m² K⁴)]

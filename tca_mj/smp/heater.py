@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tca_mj.rod.beam import require_positive
+from tca_mj.checks import require_positive
 from tca_mj.smp.convection import Slab, moving_air, radiation, still_air
 from tca_mj.smp.material import SpineSpec
 from tca_mj.tca import HeatSpec, heat_lost, power_from_voltage, step_temperature

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.special import expit
 
-from tca_mj.rod.beam import require_positive
+from tca_mj.checks import require_positive
 
 Array = NDArray[np.float64]
 

@@ -7,7 +7,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tca_mj.tca.arrays import floats
+from tca_mj.checks import floats
 from tca_mj.tca.coilrod import CoilRods
 from tca_mj.tca.coilsurface import CoilSurfaces
 from tca_mj.tca.sensing import WireTable, resistance

@@ -38,7 +38,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tca_mj.tca.arrays import floats
+from tca_mj.checks import floats
 from tca_mj.tca.moduli import FibreTable, radial_growth, softened, softening, untwist
 from tca_mj.tca.spec import TcaSpec
 

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tca_mj.tca.arrays import floats
+from tca_mj.checks import floats
 from tca_mj.tca.calibration import calibrate
 from tca_mj.tca.coilrod import CoilRods
 from tca_mj.tca.spec import TcaSpec

@@ -28,7 +28,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tca_mj.tca.arrays import floats
+from tca_mj.checks import floats
 from tca_mj.tca.coilrod import CoilRods
 from tca_mj.tca.spec import TcaSpec
 

@@ -25,7 +25,7 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tca_mj.tca.arrays import floats
+from tca_mj.checks import floats
 from tca_mj.tca.coilrod import CoilRods
 from tca_mj.tca.loads import GRAVITY, Course, Heating, Load, LoadState, step_times
 from tca_mj.tca.sensing import WireTable, resistance

@@ -6,7 +6,7 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tca_mj.tca.arrays import floats
+from tca_mj.checks import floats
 
 Array = NDArray[np.float64]
 Source = Literal["power", "voltage", "current"]

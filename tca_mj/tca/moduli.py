@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tca_mj.tca.arrays import floats
+from tca_mj.checks import floats
 from tca_mj.tca.spec import FibreSpec
 
 Array = NDArray[np.float64]

@@ -27,7 +27,7 @@ import numpy as np
 from numpy.polynomial import Polynomial
 from numpy.typing import ArrayLike, NDArray
 
-from tca_mj.tca.arrays import floats
+from tca_mj.checks import floats
 from tca_mj.tca.spec import TcaSpec
 
 Array = NDArray[np.float64]

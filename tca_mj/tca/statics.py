@@ -30,7 +30,7 @@ from typing import get_args
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tca_mj.tca.arrays import floats
+from tca_mj.checks import floats
 from tca_mj.tca.balance import Balance, Model
 from tca_mj.tca.castigliano import Scheme
 from tca_mj.tca.laws import Array, Spin

@@ -18,7 +18,7 @@ from typing import NamedTuple, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tca_mj.tca.arrays import floats
+from tca_mj.checks import floats
 
 Array = NDArray[np.float64]
 

@@ -17,9 +17,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import brentq, minimize_scalar
 
+from tca_mj.checks import floats
 from tca_mj.modules.bending import BendingSpec, bending_module
 from tca_mj.sim import Simulation
-from tca_mj.tca.arrays import floats
 from tca_mj.tca.embedding import CHANNEL_CONTACT
 
 Array = NDArray[np.float64]
