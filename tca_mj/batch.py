@@ -94,7 +94,7 @@ class SimulationBatch:
         updates = self.sims[0].updates(duration)
         moving = [i for i, drive in enumerate(drives) if drive is not None]
         inputs = [
-            sim.checked(drive.power, drive.voltage, drive.fan)
+            sim.checked(drive.command, drive.voltage, drive.fan)
             for sim, drive in zip(self.sims, drives, strict=True)
             if drive is not None
         ]
@@ -109,7 +109,9 @@ class SimulationBatch:
             drive = drives[i]
             assert drive is not None
             try:
-                self.sims[i].step(drive.power, duration, voltage=drive.voltage, fan=drive.fan)
+                self.sims[i].step(
+                    drive.command, duration, voltage=drive.voltage, fan=drive.fan
+                )
             except SimulationDiverged as error:
                 errors[i] = error
         return errors
@@ -159,6 +161,7 @@ def _alike(first: Simulation, other: Simulation) -> bool:
         and (first.substeps, first.tca_period) == (other.substeps, other.tca_period)
         and (first.bank.law, first.bank.specs) == (other.bank.law, other.bank.specs)
         and np.array_equal(first.length_offset, other.length_offset)
+        and first.bank.supply.like(other.bank.supply)
     )
 
 
@@ -184,6 +187,7 @@ class _Every:
         self.body.gather([sim.body for sim in sims])
         self.spines = Spines.batch([sim.spines for sim in sims], self.body)
         self.pull: Pull
+        self.power: Array
         self.strained: Strained
         self.now: tuple[Array, Strained]
 
@@ -195,10 +199,12 @@ class _Every:
         if astray.any():  # is thrown away, and must not stop the others
             length = np.where(inside, length, self.bank.rest_length)
             motion = np.where(astray[:, None, None], self.body.rest, motion)
-        self.tca, self.pull = advance(
+        tca, self.pull = advance(
             self.bank, self.spines, self.tca, self.inputs, length=length, motion=motion,
             gain=self.gain, period=self.period,
         )  # fmt: skip
+        self.power = (tca.energy_in - self.tca.energy_in) / self.period
+        self.tca = tca
         return astray
 
     def hand_over(
@@ -220,7 +226,7 @@ class _Every:
     def give_back(self, k: int) -> None:
         """Makes simulation ``k`` what a step of its own would have made of it."""
         sim, pull = self.sims[k], self.pull
-        sim.power = self.inputs.power[k]
+        sim.power = self.power[k].copy()
         sim.tca = row(self.tca, k)
         sim.pull = Pull(pull.tension[k], pull.stiffness[k], pull.length[k])
         sim.strained = self.strained[k]

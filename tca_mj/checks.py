@@ -64,8 +64,13 @@ def within(
     if shape is not None and array.shape != shape:
         kind = f"finite numbers of shape {shape}" if shape else "one finite number"
         raise ValueError(f"{name} must be {kind}, got {values!r}")
-    good = (array > above) & (array >= at_least) & (array < below) & (array <= at_most)
-    if (good & np.isfinite(array)).all():
+    if not array.size:
+        return array
+    least, most = float(array.min()), float(array.max())  # not a number if one is none
+    if (
+        math.isfinite(least) and math.isfinite(most)
+        and above < least >= at_least and below > most <= at_most
+    ):  # fmt: skip
         return array
     bounds = {"above": above, "at least": at_least, "below": below, "at most": at_most}
     said = [f"{word} {bound:.6g}" for word, bound in bounds.items() if math.isfinite(bound)]

@@ -35,12 +35,12 @@ class Inputs:
     """What drives TCAs and spines for a period.
 
     Attributes:
-        power: Power of the TCAs, shape (..., n) [W].
+        command: Command of the TCAs, in the unit of their supply, shape (..., n).
         voltage: Voltage of the spines' heaters, shape (..., spines) [V].
         fan: Whether air is blown at the spines, shape (..., spines).
     """
 
-    power: Array
+    command: Array
     voltage: Array
     fan: Flags
 
@@ -99,7 +99,7 @@ def advance(
     Raises:
         ValueError, TcaMelted, CoilSolveError: As ``TcaBank.advance``.
     """
-    later, pull = bank.advance(tca, inputs.power, length, period)
+    later, pull = bank.advance(tca, inputs.command, length, period)
     tension = gain * pull.tension
     if spines.n:
         rise = gain * ((pull.tension - bank.pull(tca, length).tension) / period)

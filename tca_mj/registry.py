@@ -121,3 +121,34 @@ def task_class(task: str) -> Any:
     if not hasattr(found, "robot_argument"):
         raise ValueError(f"task must be a SimulatedTask, got {task!r}, made by {entry}")
     return found
+
+
+def episode_steps(task: str, control_period: float | None = None) -> int | None:
+    """Steps of an episode of a task's own length; None if it has no limit.
+
+    Args:
+        task: Gymnasium id, or ``module:id``.
+        control_period: Time of a step, if it is not the task's own [s].
+
+    Raises:
+        ValueError: As ``find_task``.
+    """
+    steps = find_task(task).max_episode_steps
+    if steps is None or control_period is None:
+        return steps
+    return max(1, round(steps * task_class(task).control_period / control_period))
+
+
+def make(task: str, *, max_episode_steps: int | None = None, **arguments: Any) -> Any:
+    """``gymnasium.make``, where an episode takes as long as the task's own at any control period.
+
+    Args:
+        task: Gymnasium id, or ``module:id``.
+        max_episode_steps: Steps after which an episode is truncated instead.
+        **arguments: Of ``gymnasium.make`` and of the task.
+
+    Raises:
+        ValueError: As ``find_task``.
+    """
+    steps = max_episode_steps or episode_steps(task, arguments.get("control_period"))
+    return gymnasium.make(task, max_episode_steps=steps, **arguments)

@@ -12,7 +12,9 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
+
+from tca_mj.checks import Array, number, require_count
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,23 +35,21 @@ class Helix:
     phase: float = 0.0
 
     def __post_init__(self) -> None:
-        for field in ("radius", "turns", "phase"):
-            if not np.isfinite(getattr(self, field)):
-                raise ValueError(f"{field} must be finite, got {getattr(self, field)}")
-        if self.radius < 0.0:
-            raise ValueError(f"radius must be at least 0 m, got {self.radius}")
+        number("radius", self.radius, at_least=0.0, unit="m")
+        number("turns", self.turns)
+        number("phase", self.phase)
 
     @property
     def legs(self) -> tuple["Helix", ...]:
         """The route as a tuple of legs: a helix is its own single leg."""
         return (self,)
 
-    def offset(self, s: ArrayLike) -> NDArray[np.float64]:
+    def offset(self, s: ArrayLike) -> Array:
         """Offset from the centre line at ``s`` in [0, 1], shape (..., 2) [m]."""
         angle = self.phase + 2.0 * np.pi * self.turns * np.asarray(s, dtype=np.float64)
         return self.radius * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
 
-    def slope(self, s: ArrayLike) -> NDArray[np.float64]:
+    def slope(self, s: ArrayLike) -> Array:
         """Derivative of the offset by ``s``, shape (..., 2) [m]."""
         rate = 2.0 * np.pi * self.turns
         angle = self.phase + rate * np.asarray(s, dtype=np.float64)
@@ -88,8 +88,7 @@ class UTurn:
         Raises:
             ValueError: If the half width is negative.
         """
-        if not half_width >= 0.0:
-            raise ValueError(f"half_width must be at least 0 m, got {half_width}")
+        number("half_width", half_width, at_least=0.0, unit="m")
         radius, angle = float(np.hypot(offset, half_width)), float(np.arctan2(half_width, offset))
         return cls(Helix(radius, phase=direction - angle), Helix(radius, phase=direction + angle))
 
@@ -114,8 +113,7 @@ def parallel(count: int, radius: float, phase: float = 0.0) -> tuple[Helix, ...]
     Raises:
         ValueError: If the count is below one.
     """
-    if count < 1:
-        raise ValueError(f"count must be at least 1, got {count}")
+    require_count(count=count)
     return tuple(Helix(radius, phase=phase + 2.0 * np.pi * i / count) for i in range(count))
 
 

@@ -8,7 +8,7 @@ of the smooth curve that its polyline stands for, and the joints get springs tha
 do the work that this length says: see ``tca_mj.model.smooth``.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
@@ -16,7 +16,7 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tca_mj.checks import floats
+from tca_mj.actuation import Group, MixedBank, Signal, muscle_group
 from tca_mj.couple import Inputs, Writes, advance, measure, write
 from tca_mj.model.part import Part
 from tca_mj.model.smooth import SmoothBody
@@ -25,6 +25,7 @@ from tca_mj.tca import (
     CalibrationError,
     CoilSolveError,
     Pull,
+    Supply,
     TcaBank,
     TcaMelted,
     TcaSpec,
@@ -56,12 +57,12 @@ class Drive:
     """What drives a simulation, constant over a step; checked by ``Simulation.step``.
 
     Attributes:
-        power: Power of the TCAs, shape (n,) [W].
+        command: Command of the TCAs, in the unit of the simulation's supply, shape (n,).
         voltage: Voltage of the spines' heaters, shape (spines.n,) or one for all [V].
         fan: Whether air is blown at the spines, shape (spines.n,) or one for all.
     """
 
-    power: NDArray[np.float64]
+    command: NDArray[np.float64]
     voltage: ArrayLike = 0.0
     fan: ArrayLike = False
 
@@ -79,7 +80,7 @@ class Simulation:
         tendon: Ids of their tendons in ``model``, shape (n,).
         tca_period: Time between two updates of the TCAs [s].
         substeps: Number of physics steps in it.
-        power: Electrical power of the last step, shape (n,) [W].
+        power: Electrical power in the last period, shape (n,) [W].
         body: The springs that stand for its cells.
         strained: The cells at the last update.
         actuator: Ids of the TCAs' actuators, shape (n,).
@@ -97,6 +98,7 @@ class Simulation:
         tca_period: float = 2e-2,
         ambient: float = 25.0,
         law: Literal["rod", "surface"] = "surface",
+        supply: Supply | None = None,
     ) -> None:
         """Compiles ``part``; its specification can still be changed and compiled again.
 
@@ -107,6 +109,7 @@ class Simulation:
             ambient: Temperature of the surroundings and of the cold TCAs [°C].
             law: What computes the TCAs' tensions, see ``TcaBank``. If a coil has no "surface",
                 which no published one lacks, the exact "rod" takes its place; ``bank.law`` tells.
+            supply: What the commands of ``step`` mean; by default they are powers.
 
         Raises:
             ValueError: If a time is not positive or the period is no multiple of the time step, or
@@ -125,7 +128,8 @@ class Simulation:
         self.data = mujoco.MjData(self.model)
         self.tca_period = tca_period
         self.tca_names = tuple(tca.name for tca in part.tcas)
-        self.bank = _bank(tuple(replace(tca.spec, ambient=ambient) for tca in part.tcas), law)
+        self.bank = _bank([tca.spec for tca in part.tcas], law, ambient)
+        self.bank.supply = supply or Supply()
         self.substeps = substeps
         self.gain = 1.0
 
@@ -248,6 +252,46 @@ class Simulation:
         """Electrical energy put into each TCA so far, shape (n,) [J]."""
         return self.tca.energy_in
 
+    @property
+    def motors(self) -> tuple[str, ...]:
+        """Names of the model's actuators that are no muscles, in the order of ``data.ctrl``."""
+        mine = set(self.actuator.tolist())
+        model = self.model
+        return tuple(model.actuator(i).name for i in range(model.nu) if i not in mine)
+
+    @property
+    def groups(self) -> tuple[Group, ...]:
+        """Everything that drives the body, kind by kind: muscles, spines, motors."""
+        kinds = [bank.kind for _, bank in getattr(self.bank, "kinds", ((None, self.bank),))]
+        kinds += ["spine"] * bool(self.spines.n) + ["motor"] * bool(self.motors)
+        return tuple(self.group(kind) for kind in kinds)
+
+    def group(self, kind: str) -> Group:
+        """One of ``groups``: "TCA", the kind of another bank, "spine" or "motor"."""
+        if kind == "spine":
+            spines = self.spines
+            return Group(
+                kind=kind, names=spines.names, channels={"voltage": "V", "fan": "-"},
+                signals={
+                    "temperature": Signal("°C", spines.temperature),
+                    "voltage": Signal("V", spines.voltage), "energy": Signal("J", spines.energy),
+                    "damage": Signal("-", spines.damaged.astype(np.float64)),
+                },
+            )  # fmt: skip
+        if kind == "motor":
+            data, ids = self.data, [self.model.actuator(name).id for name in self.motors]
+            return Group(
+                kind=kind, names=self.motors, channels={"ctrl": "-"},
+                signals={
+                    "position": Signal("m or rad", data.actuator_length[ids]),
+                    "velocity": Signal("m/s or rad/s", data.actuator_velocity[ids]),
+                    "force": Signal("N or N m", data.actuator_force[ids]),
+                },
+            )  # fmt: skip
+        return muscle_group(
+            self.bank, self.tca, kind, self.length, self.tension, self.tca_names
+        )
+
     def physics(self) -> Any:
         """dm_control's named view of this model and data, which it shares.
 
@@ -259,42 +303,43 @@ class Simulation:
 
     def step(
         self,
-        power: ArrayLike,
+        command: ArrayLike,
         duration: float,
         *,
         voltage: ArrayLike = 0.0,
         fan: ArrayLike = False,
     ) -> None:
-        """Advances by ``duration`` [s] at constant electrical ``power``, shape (n,) [W].
+        """Advances by ``duration`` [s] with constant commands.
 
         Args:
-            power: Power of the TCAs, shape (n,) [W].
+            command: Command of the TCAs, shape (n,): powers [W], or what ``bank.supply`` says.
             duration: Time to advance by [s].
             voltage: Voltage of the spines' heaters, shape (spines.n,) or one for all [V].
             fan: Whether air is blown at the spines, shape (spines.n,) or one for all.
 
         Raises:
-            ValueError: If the power has the wrong shape, is negative or not finite, the voltage
+            ValueError: If the command has the wrong shape, is negative or not finite, the voltage
                 or the fan has the wrong shape or is not finite, or the duration is no multiple of
                 ``tca_period``.
             SimulationOverheated: If a TCA would be hotter than its fibre melts at.
             SimulationDiverged: If the state is no longer finite, or a TCA is shorter, longer or
                 hotter than its law holds for.
         """
-        inputs = self.checked(power, voltage, fan)
+        inputs = self.checked(command, voltage, fan)
         updates = self.updates(duration)
         model, data = self.model, self.data
-        self.power = inputs.power
         for _ in range(updates):
             self.strained, length, inside = measure(
                 self.body, self.bank, data.qpos, self.length_offset
             )
             self._check_length(length, inside)
             try:
-                self.tca, pull = advance(
+                tca, pull = advance(
                     self.bank, self.spines, self.tca, inputs, length=length,
                     motion=self.strained.motion, gain=self.gain, period=self.tca_period,
                 )  # fmt: skip
+                self.power = (tca.energy_in - self.tca.energy_in) / self.tca_period
+                self.tca = tca
             except TcaMelted as melted:
                 raise SimulationOverheated(
                     f"{self.tca_names[melted.number]} {melted.why}, at {self.time:.3f} s"
@@ -307,20 +352,13 @@ class Simulation:
             mujoco.mj_step(model, data, self.substeps)
         self._check()
 
-    def checked(
-        self, power: ArrayLike, voltage: ArrayLike, fan: ArrayLike
-    ) -> Inputs:
-        """Power, shape (n,), voltage and fan, shape (spines.n,) each, for ``step``.
+    def checked(self, command: ArrayLike, voltage: ArrayLike, fan: ArrayLike) -> Inputs:
+        """Command, shape (n,), voltage and fan, shape (spines.n,) each, for ``step``.
 
         Raises:
             ValueError: As ``step``.
         """
-        power = np.array(floats("power", power))
-        if power.shape != (self.n,):
-            raise ValueError(f"power must have shape ({self.n},), got {power.shape}")
-        if not (np.isfinite(power).all() and (power >= 0.0).all()):
-            raise ValueError(f"power must be finite and at least 0 W, got {power}")
-        return Inputs(power, *self.spines.checked(voltage, fan))
+        return Inputs(self.bank.checked(command), *self.spines.checked(voltage, fan))
 
     def updates(self, duration: float) -> int:
         """How many updates of the TCAs a duration [s] takes.
@@ -382,8 +420,28 @@ class Simulation:
             )
 
 
-def _bank(specs: tuple[TcaSpec, ...], law: Literal["rod", "surface"]) -> TcaBank:
+def _bank(specs: Sequence[Any], law: Literal["rod", "surface"], ambient: float) -> Any:
+    """The bank of all muscles."""
+    kinds: dict[type, list[int]] = {}
+    for place, spec in enumerate(specs):
+        kinds.setdefault(type(spec), []).append(place)
+    banks = []
+    for kind, places in kinds.items():
+        own = [specs[i] for i in places]
+        if kind is TcaSpec:
+            banks.append((np.array(places), _tca_bank(own, law, ambient)))
+        else:
+            banks.append((np.array(places), kind.bank(own)))  # type: ignore[attr-defined]
+    if len(banks) == 1 and isinstance(banks[0][1], TcaBank):
+        return banks[0][1]
+    return MixedBank(specs, banks)
+
+
+def _tca_bank(
+    specs: Sequence[TcaSpec], law: Literal["rod", "surface"], ambient: float
+) -> TcaBank:
+    surrounded = tuple(replace(spec, ambient=ambient) for spec in specs)
     try:
-        return TcaBank(specs, law)
+        return TcaBank(surrounded, law)
     except CalibrationError:
-        return TcaBank(specs, "rod")
+        return TcaBank(surrounded, "rod")

@@ -21,8 +21,8 @@ from gymnasium.utils.env_checker import check_env
 from numpy.typing import NDArray
 
 from tca_mj.envs.vector import TaskVector
+from tca_mj.record.render import RenderingUnavailable
 from tca_mj.registry import find_task, task_class
-from tca_mj.render import RenderingUnavailable
 
 KEYS = {
     "time", "energy", "heater_energy", "temperature", "body_temperature", "spine_temperature",
@@ -243,6 +243,59 @@ def fingerprint(id: str) -> str:
     return hashlib.sha256(repr(_rollout(_task(id), seed=11)).encode()).hexdigest()
 
 
+def check_control_period(id: str) -> None:
+    """A step of twice the time is two steps with one action, whose rewards add up."""
+    task = _task(id)
+    longer = _task(id, control_period=2.0 * task.control_period)
+    assert _bits(longer.reset(seed=4)[0]) == _bits(task.reset(seed=4)[0])
+    for action in _actions(task, 3):
+        _, first, *ended, _ = task.step(action)
+        if any(ended):
+            break
+        observation, second, *ended, info = task.step(action)
+        if any(ended):
+            break
+        seen, reward, *_, whole = longer.step(action)
+        assert _bits(seen) == _bits(observation), "two short steps lead elsewhere"
+        assert math.isclose(reward, first + second, abs_tol=1e-9), "rewards do not add up"
+        assert whole["time"] == info["time"]
+    try:
+        _task(id, control_period=0.37 * task.interval)
+    except ValueError as error:
+        assert "control_period" in str(error), error
+    else:
+        raise AssertionError("a control period between two updates is not refused")
+
+
+def check_heat(id: str) -> None:
+    """Whatever temperatures are asked for, no TCA gets too hot or torn, nor is anything charged."""
+    task, random = _task(id), np.random.default_rng(5)
+    task.reset(seed=5)
+    for number in range(200):
+        if number % 10 == 0:
+            action = random.choice([-1.0, 1.0], task.action.size).astype(np.float32)
+        *_, terminated, truncated, info = task.step(action)
+        sim = task.sim
+        assert (sim.temperature < task.max_temperature).all(), f"{sim.temperature} °C"
+        assert (sim.tension < sim.bank.breaking_force).all(), f"{sim.tension} N"
+        if terminated or truncated:
+            assert "overheated" not in info.get("truncation_reason", "")
+            task.reset()
+
+
+def check_scales(id: str) -> None:
+    """Scaled observations are of the order of 1; mirrored twice, everything is as it was."""
+    task = _task(id)
+    observation, _ = task.reset(seed=6)
+    for action in _actions(task, 10):
+        scaled = task.observation.scaled(observation)
+        assert np.abs(scaled).max() < 10.0, f"scaled to {scaled}"
+        for table, values in ((task.observation, observation), (task.action, action)):
+            if table.symmetric:
+                assert _bits(table.mirrored(table.mirrored(values))) == _bits(values)
+        observation, *_ = task.step(action)
+
+
 def check_divergence(id: str) -> None:
     """A state that is not finite ends the episode with a reason, within the space."""
     task = _task(id)
@@ -281,6 +334,9 @@ CHECKS: dict[str, Callable[[str], None]] = {
     "vector": check_vector,
     "actions": check_actions,
     "process": check_process,
+    "control period": check_control_period,
+    "heat": check_heat,
+    "scales": check_scales,
     "divergence": check_divergence,
     "pictures": check_pictures,
 }

@@ -6,13 +6,11 @@ longer has it.
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import brentq
 from scipy.special import ellipk, ellipkinc
 
+from tca_mj.checks import Array
 from tca_mj.rod import BeamSpec
-
-Array = NDArray[np.float64]
 
 # The bending module's section of Ecoflex 00-30: a cable of capsules has the same EI and GJ.
 YOUNG, DIAMETER, DENSITY = 0.125e6, 4.5e-3, 1070.0

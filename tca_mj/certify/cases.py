@@ -1,18 +1,18 @@
 """Cases drawn by seed, their answers by theory and by MuJoCo, and the differences."""
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from tca_mj.certify.rest import Load, Rest, rest, run
-from tca_mj.certify.subjects import Subject, slack
-from tca_mj.rod import solve_series
+from tca_mj.certify.subjects import Limb, Subject, slack
+from tca_mj.checks import Array
+from tca_mj.rod import RodShape, solve_series
 from tca_mj.rod.problem import StrandLaw
 from tca_mj.tca import law_at
-
-Array = NDArray[np.float64]
 
 GRAVITY = 9.81  # [m/s²]
 _COLD = 0.3  # share of the TCAs that are left cold
@@ -64,8 +64,7 @@ def draw(subject: Subject, name: str, count: int, seed: int) -> list[Case]:
         seed: Seed; the first cases of a longer list are the shorter list.
     """
     rng = np.random.default_rng([seed, *name.encode()])
-    tips, low_high = len(subject.tips), subject.temperature
-    tcas = len(subject.tcas)
+    tips, tcas, low_high = len(subject.tips), len(subject.tcas), subject.temperature
     cases = []
     for _ in range(count):
         temperature = rng.uniform(*low_high, size=tcas)
@@ -109,11 +108,7 @@ def theory(
     laws = _laws(subject, case)
     length = np.zeros(len(laws))
     tips = []
-    for i, limb in enumerate(subject.limbs(laws)):
-        shapes = solve_series(
-            limb.segments, tip_force=case.load.force[i], tip_moment=case.load.moment[i],
-            gravity=case.load.gravity, shearable=shearable, solver=solver, points=2,
-        )  # fmt: skip
+    for limb, shapes in _shapes(subject, case, shearable=shearable, solver=solver, points=2):
         for shape, numbers in zip(shapes, limb.tcas, strict=True):
             np.add.at(length, list(numbers), shape.tca_length)
         tips.append(shapes[-1])
@@ -123,6 +118,17 @@ def theory(
         length=length,
         tension=np.array([law(each)[0] for law, each in zip(laws, length, strict=True)]),
     )
+
+
+def _shapes(
+    subject: Subject, case: Case, **how: Any
+) -> Iterator[tuple[Limb, Sequence[RodShape]]]:
+    """The limbs of a module and the shapes of their bodies by theory, solved as ``how`` says."""
+    for i, limb in enumerate(subject.limbs(_laws(subject, case))):
+        yield limb, solve_series(
+            limb.segments, tip_force=case.load.force[i], tip_moment=case.load.moment[i],
+            gravity=case.load.gravity, **how,
+        )  # fmt: skip
 
 
 def at_rest(subject: Subject, case: Case, times: int = 1, *, near: str | None = None) -> Rest:
@@ -146,11 +152,7 @@ def at_rest(subject: Subject, case: Case, times: int = 1, *, near: str | None = 
 def _joints(subject: Subject, case: Case, times: int, solver: str) -> dict[str, float]:
     """Positions of the joints whose cells are strained as theory says in their middles."""
     joints = {}
-    for i, limb in enumerate(subject.limbs(_laws(subject, case))):
-        shapes = solve_series(
-            limb.segments, tip_force=case.load.force[i], tip_moment=case.load.moment[i],
-            gravity=case.load.gravity, shearable=False, solver=solver,
-        )  # fmt: skip
+    for limb, shapes in _shapes(subject, case, shearable=False, solver=solver):
         for shape, chain, default in zip(shapes, limb.chains, subject.nodes, strict=True):
             nodes = times * default
             cell = shape.arc_length[-1] / nodes
@@ -191,13 +193,10 @@ def gap(subject: Subject, found: Rest, exact: Rest) -> Gap:
 
 def bent(subject: Subject, exact: Rest) -> float:
     """Largest angle by which a tip's axis is turned from the unloaded shape [rad]."""
-    angles = []
     limbs = subject.limbs([slack] * len(subject.tcas))
-    for limb, frame in zip(limbs, exact.rotation, strict=True):
-        start = solve_series(limb.segments, points=2)[-1].rotation[-1]
-        cosine = float(start[:, 2] @ frame[:, 2])
-        angles.append(np.arccos(np.clip(cosine, -1.0, 1.0)))
-    return float(max(angles))
+    starts = [solve_series(limb.segments, points=2)[-1].rotation[-1] for limb in limbs]
+    cosines = [float(a[:, 2] @ b[:, 2]) for a, b in zip(starts, exact.rotation, strict=True)]
+    return float(np.arccos(np.clip(cosines, -1.0, 1.0)).max())
 
 
 def _laws(subject: Subject, case: Case) -> list[StrandLaw]:

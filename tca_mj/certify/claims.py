@@ -5,14 +5,14 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from tca_mj.certify.cable import BEAM as CABLE_BEAM
 from tca_mj.certify.cable import MOMENT, cable_tip, moment_tip, off
 from tca_mj.certify.cases import Case, Load, draw, theory
-from tca_mj.certify.rest import Rest, run
+from tca_mj.certify.rest import run
 from tca_mj.certify.subjects import SUBJECTS
+from tca_mj.checks import Array
 from tca_mj.model import settle
 from tca_mj.model.part import Part
 from tca_mj.modules.bending import BendingSpec, bending_module
@@ -21,34 +21,32 @@ from tca_mj.rod import BeamSpec, RodShape, solve_static
 from tca_mj.routes import Helix, Route, UTurn, parallel
 from tca_mj.sim import Simulation
 
-Array = NDArray[np.float64]
+Vector = tuple[float, float, float]
 
 BODY = BendingSpec().body
 NODES = BendingSpec().nodes
 _STRAIGHT = Helix(4e-3)
-_NONE = np.zeros(3)
+_NONE = (0.0, 0.0, 0.0)
 
 # Shapes of the bending module's body by the full theory, with shear: routes, tensions [N], tip
 # force [N], tip [mm], twist along the rod, ∫ u₃ ds [deg], or None. The first three are arcs,
 # u = F a/EI and v = 1 - F/EA; the last one is v = 1 - 3 F/EA; the others were computed by two
 # solvers outside this package.
-_KNOWN: Sequence[tuple[str, Sequence[Route], Sequence[float], tuple[float, float, float],
-                       tuple[float, float, float], float | None]] = (
-    ("0.01 N straight", [_STRAIGHT], [0.01], (0.0, 0.0, 0.0), (15.344, 0.0, 41.051), None),
-    ("0.02 N straight", [_STRAIGHT], [0.02], (0.0, 0.0, 0.0), (26.790, 0.0, 30.830), None),
-    ("0.04 N straight", [_STRAIGHT], [0.04], (0.0, 0.0, 0.0), (30.218, 0.0, 4.259), None),
+_KNOWN: Sequence[tuple[str, Sequence[Route], Sequence[float], Vector, Vector, float | None]] = (
+    ("0.01 N straight", [_STRAIGHT], [0.01], _NONE, (15.344, 0.0, 41.051), None),
+    ("0.02 N straight", [_STRAIGHT], [0.02], _NONE, (26.790, 0.0, 30.830), None),
+    ("0.04 N straight", [_STRAIGHT], [0.04], _NONE, (30.218, 0.0, 4.259), None),
     ("0.02 N straight, 2 mN across", [_STRAIGHT], [0.02], (0.0, 2e-3, 0.0),
      (22.596, 18.267, 28.046), 19.6),
-    ("0.02 N on a helix of one turn", [Helix(4e-3, 1.0)], [0.02], (0.0, 0.0, 0.0),
+    ("0.02 N on a helix of one turn", [Helix(4e-3, 1.0)], [0.02], _NONE,
      (0.672, 11.545, 41.679), -56.7),
-    ("three times 0.05 N", parallel(3, 4e-3), [0.05] * 3, (0.0, 0.0, 0.0),
-     (0.0, 0.0, 41.605), None),
+    ("three times 0.05 N", parallel(3, 4e-3), [0.05] * 3, _NONE, (0.0, 0.0, 41.605), None),
 )  # fmt: skip
 
 # Routes, tensions [N] and tip force [N]: in the plane and out of it.
-_BENT: Sequence[tuple[str, Sequence[Route], Sequence[float], tuple[float, float, float]]] = (
-    ("41°", [_STRAIGHT], [0.01], (0.0, 0.0, 0.0)),
-    ("82°", [_STRAIGHT], [0.02], (0.0, 0.0, 0.0)),
+_BENT: Sequence[tuple[str, Sequence[Route], Sequence[float], Vector]] = (
+    ("41°", [_STRAIGHT], [0.01], _NONE),
+    ("82°", [_STRAIGHT], [0.02], _NONE),
     ("41°, 1 mN in the plane", [_STRAIGHT], [0.01], (1e-3, 0.0, 0.0)),
     ("82°, 2 mN across", [_STRAIGHT], [0.02], (0.0, 2e-3, 0.0)),
     ("three unlike tensions, 1 mN across", parallel(3, 4e-3), [0.02, 0.012, 0.004],
@@ -58,7 +56,7 @@ _BENT: Sequence[tuple[str, Sequence[Route], Sequence[float], tuple[float, float,
 )  # fmt: skip
 
 
-@dataclass(frozen=True, kw_only=True, slots=True)
+@dataclass(frozen=True, slots=True)
 class Claim:
     """One statement.
 
@@ -100,37 +98,30 @@ def known() -> Iterator[Claim]:
             wrong = abs(float(np.degrees(_twist(shape))) - twist)
             held, found = held and wrong < 0.1, f"{found}, {wrong:.2f}°"
         asked = "0.01 mm" if twist is None else "0.01 mm, 0.1°"
-        yield Claim(group="theory, known shapes", what=what, asked=asked, found=found, held=held)
+        yield Claim("theory, known shapes", what, asked, found, held)
 
 
 def bends() -> Iterator[Claim]:
     """The chain at the default nodes against the theory without shear."""
-    for what, routes, tensions, force in (
-        *_BENT, ("164°", [_STRAIGHT], [0.04], (0.0, 0.0, 0.0))
-    ):  # fmt: skip
+    for what, routes, tensions, force in (*_BENT, ("164°", [_STRAIGHT], [0.04], _NONE)):
         exact = solve_static(BODY, routes, tensions, tip_force=force, shearable=False)
         chain = settle(BODY, routes, tensions, nodes=NODES, tip_force=force)
         place, turn = _errors(chain, exact)
         most = 0.02 if np.degrees(exact.bend_angle) > 90.0 else 0.01
-        yield Claim(
-            group=f"chain, {NODES} nodes", what=what, asked=f"{100 * most:g} % of L, 1°",
-            found=f"{100 * place:.2f} %, {turn:.2f}°", held=place < most and turn < 1.0,
-        )  # fmt: skip
+        yield Claim(f"chain, {NODES} nodes", what, f"{100 * most:g} % of L, 1°",
+                    f"{100 * place:.2f} %, {turn:.2f}°", place < most and turn < 1.0)  # fmt: skip
 
 
 def orders() -> Iterator[Claim]:
     """How the error falls when the nodes are doubled."""
     for what, routes, tensions, force in _BENT:
         exact = solve_static(BODY, routes, tensions, tip_force=force, shearable=False)
-        error = [
+        coarse, fine = (
             _errors(settle(BODY, routes, tensions, nodes=n, tip_force=force), exact)[0]
             for n in (NODES, 2 * NODES)
-        ]
-        ratio = error[0] / error[1]
-        yield Claim(
-            group="order of the chain", what=what, asked="3.3 to 4.7", found=f"{ratio:.2f}",
-            held=3.3 < ratio < 4.7,
-        )  # fmt: skip
+        )
+        ratio = coarse / fine
+        yield Claim("order of the chain", what, "3.3 to 4.7", f"{ratio:.2f}", 3.3 < ratio < 4.7)
 
 
 def helices() -> Iterator[Claim]:
@@ -142,12 +133,11 @@ def helices() -> Iterator[Claim]:
             chain = settle(spec.body, [spec.route], [force], nodes=nodes)
             twist = _twist(exact)
             # The tip's rotation, the difference taken around the circle: it may be above 180°.
-            error = abs(_wrapped(chain.twist_angle - exact.twist_angle) / twist)
-            yield Claim(
-                group=f"{'double' if double else 'single'} helix, 5 turns, {nodes} nodes",
-                what=f"{force} N, {np.degrees(twist):.0f}°", asked="3 %",
-                found=f"{100 * error:.2f} %", held=error < 0.03,
-            )  # fmt: skip
+            gap = (chain.twist_angle - exact.twist_angle + np.pi) % (2.0 * np.pi) - np.pi
+            error = abs(float(gap) / twist)
+            yield Claim(f"{'double' if double else 'single'} helix, 5 turns, {nodes} nodes",
+                        f"{force} N, {np.degrees(twist):.0f}°", "3 %", f"{100 * error:.2f} %",
+                        error < 0.03)  # fmt: skip
 
 
 def _twist(shape: RodShape) -> float:
@@ -156,58 +146,38 @@ def _twist(shape: RodShape) -> float:
     return float(np.trapezoid(shape.strain[:, 2], shape.arc_length))
 
 
-def _wrapped(angle: float) -> float:
-    return float((angle + np.pi) % (2.0 * np.pi) - np.pi)
-
-
 _TEMPERATURE = np.array([110.0, 60.0, 25.0])
-_STILL = Load(
-    force=np.array([[0.0, 1e-3, 0.0]]), moment=np.zeros((1, 3)), gravity=np.zeros(3)
-)  # no weight: density may change
+# No weight: density may change.
+_STILL = Load(force=np.array([[0.0, 1e-3, 0.0]]), moment=np.zeros((1, 3)), gravity=np.zeros(3))
 
 
 def _changed(change: str) -> Part:
-    spec = BendingSpec()
-    part = bending_module(spec)
+    part = bending_module()
     for joint in part.spec.joints:
-        if change == "armature":
-            joint.armature = 1e-9
-        elif change == "damping":
-            joint.damping = 3.0 * joint.damping
+        joint.armature = 1e-9 if change == "armature 1e-9 kg m²" else joint.armature
+        joint.damping = (3.0 if change == "three times the damping" else 1.0) * joint.damping
     for geom in part.spec.geoms:
-        if change == "density":
-            geom.mass = 3.0 * geom.mass
+        geom.mass = (3.0 if change == "three times the density" else 1.0) * geom.mass
     return part
 
 
 def invariance() -> Iterator[Claim]:
     """What a simulation at rest must not depend on; and it returns after the heat has gone."""
-    group = "bending module as run"
 
-    def end(change: str = "", timestep: float | None = None) -> Rest:
-        return run(_changed(change), ["tip"], _TEMPERATURE, _STILL, timestep=timestep)[0]
+    def end(change: str = "", timestep: float | None = None) -> Array:
+        return run(_changed(change), ["tip"], _TEMPERATURE, _STILL, timestep=timestep)[0].position
 
-    first = end()
-
-    def away(other: Rest) -> float:
-        return float(np.linalg.norm(other.position - first.position)) / BODY.length
-
-    for what, other in (
-        ("time step 1 ms for 2 ms", end(timestep=1e-3)),
-        ("time step 5 ms for 2 ms", end(timestep=5e-3)),
-        *((f"{'armature 1e-9 kg m²' if each == 'armature' else f'three times the {each}'}",
-           end(each)) for each in ("damping", "armature", "density")),
-    ):  # fmt: skip
-        error = away(other)
-        yield Claim(
-            group=group, what=what, asked="0.1 % of L", found=f"{100 * error:.5f} %",
-            held=error < 1e-3,
-        )  # fmt: skip
-    error = _returned() / BODY.length
-    yield Claim(
-        group=group, what="heated to 120 °C and cold again", asked="0.1 % of L",
-        found=f"{100 * error:.5f} %", held=error < 1e-3,
-    )  # fmt: skip
+    first, changes = end(), {
+        "time step 1 ms for 2 ms": 1e-3, "time step 5 ms for 2 ms": 5e-3,
+        "three times the damping": None, "armature 1e-9 kg m²": None,
+        "three times the density": None,
+    }  # fmt: skip
+    ways = {what: float(np.linalg.norm(end(what, step) - first)) for what, step in changes.items()}
+    ways["heated to 120 °C and cold again"] = _returned()
+    for what, way in ways.items():
+        error = way / BODY.length
+        yield Claim("bending module as run", what, "0.1 % of L", f"{100 * error:.5f} %",
+                    error < 1e-3)  # fmt: skip
 
 
 def _returned() -> float:
@@ -240,10 +210,7 @@ def scaling() -> Iterator[Claim]:
     ):
         one, two = solve(BODY, 0.02, force), solve(_scaled(BODY, 2.0), 0.04, 2.0 * force)
         error = float(np.abs(two.position - one.position).max()) / BODY.length
-        yield Claim(
-            group="E and loads doubled", what=what, asked="1e-8 of L", found=f"{error:.0e}",
-            held=error < 1e-8,
-        )  # fmt: skip
+        yield Claim("E and loads doubled", what, "1e-8 of L", f"{error:.0e}", error < 1e-8)
 
 
 def speed(count: int = 10) -> Iterator[Claim]:
@@ -258,43 +225,34 @@ def speed(count: int = 10) -> Iterator[Claim]:
         Case(temperature=np.array([110.0, 60.0, 60.0, 80.0]), posture="hanging", load=quiet),
         *draw(subject, "speed", count, seed=0),
     ]
-    seconds = []
-    for case in cases:
-        best = np.inf  # of three: others may be using the processor's caches
-        for _ in range(3):
-            begin = time.process_time()
-            theory(subject, case, shearable=True)
-            best = min(best, time.process_time() - begin)
-        seconds.append(best)
+
+    def taken(case: Case) -> float:
+        begin = time.process_time()
+        theory(subject, case, shearable=True)
+        return time.process_time() - begin
+
+    # The best of three: others may be using the processor's caches.
+    seconds = [min(taken(case) for _ in range(3)) for case in cases]
     median = float(np.median(seconds))
-    yield Claim(
-        group="speed of the theory", what="arm of two modules, median", asked="50 ms",
-        found=f"{1e3 * median:.0f} ms (at most {1e3 * max(seconds):.0f})", held=median < 0.05,
-    )  # fmt: skip
+    yield Claim("speed of the theory", "arm of two modules, median", "50 ms",
+                f"{1e3 * median:.0f} ms (at most {1e3 * max(seconds):.0f})",
+                median < 0.05)  # fmt: skip
 
 
 def cables() -> Iterator[Claim]:
     """Bent to a quarter circle by a moment: MuJoCo's own cable finds what the chain finds."""
-    moment = np.array([0.0, MOMENT, 0.0])
+    group, moment = "90° by a moment, closed form", np.array([0.0, MOMENT, 0.0])
     stiff = replace(CABLE_BEAM, stretching=1e6 * CABLE_BEAM.stretching)
     chain = off(settle(stiff, [], [], nodes=16, tip_moment=moment).tip, moment_tip())
     assert chain is not None
-    yield Claim(
-        group="90° by a moment, closed form", what="chain, 16 nodes", asked="0.1 % of L",
-        found=f"{100 * chain:.2f} %", held=chain < 1e-3,
-    )  # fmt: skip
-    errors = [off(cable_tip(bodies, _NONE, moment), moment_tip()) for bodies in (16, 32)]
-    if errors[0] is None or errors[1] is None:
-        yield Claim(
-            group="90° by a moment, closed form", what="MuJoCo's cable", asked="first order",
-            found="this MuJoCo has none", held=None,
-        )  # fmt: skip
+    yield Claim(group, "chain, 16 nodes", "0.1 % of L", f"{100 * chain:.2f} %", chain < 1e-3)
+    tips = [cable_tip(bodies, np.zeros(3), moment) for bodies in (16, 32)]
+    coarse, fine = (off(tip, moment_tip()) for tip in tips)
+    if coarse is None or fine is None:
+        yield Claim(group, "MuJoCo's cable", "first order", "this MuJoCo has none", None)
         return
     # Its joints stand at the ends of its bodies: the error is of first order.
-    limit = 2.0 * errors[1] - errors[0]
-    yield Claim(
-        group="90° by a moment, closed form",
-        what=f"MuJoCo's cable: {100 * errors[0]:.2f} % with 16 bodies, {100 * errors[1]:.2f} %"
-        " with 32, extrapolated",
-        asked="0.1 % of L", found=f"{100 * limit:.3f} %", held=abs(limit) < 1e-3,
-    )  # fmt: skip
+    limit = 2.0 * fine - coarse
+    yield Claim(group, f"MuJoCo's cable: {100 * coarse:.2f} % with 16 bodies, {100 * fine:.2f} %"
+                " with 32, extrapolated", "0.1 % of L", f"{100 * limit:.3f} %",
+                abs(limit) < 1e-3)  # fmt: skip

@@ -17,8 +17,7 @@ _FLOOR = 1e-6  # smaller errors are drawn here
 
 def draw_figures(rows: Mapping[str, Sequence[Outcome]], out: Path) -> None:
     """Draws ``accuracy_bend.png`` and ``accuracy_nodes.png`` into a folder that exists."""
-    columns = len(rows)
-    draw(out / "accuracy_bend.png", max(4.2, 2.7 * columns), 5.2, lambda f: _bend(f, rows))
+    draw(out / "accuracy_bend.png", max(4.2, 2.7 * len(rows)), 5.2, lambda f: _bend(f, rows))
     draw(out / "accuracy_nodes.png", 9.0, 4.4, lambda f: _nodes(f, rows))
 
 
@@ -36,7 +35,7 @@ def _bend(figure: Any, rows: Mapping[str, Sequence[Outcome]]) -> None:
                 below.scatter(angle, [np.degrees(gap.rotation) for _, gap in some], **style)
         above.axhline(100.0 * POSITION, color="#666666", lw=1, ls="--")
         below.axhline(np.degrees(ROTATION), color="#666666", lw=1, ls="--")
-        above.set(title=f"{name}, {_nodes_of(name)} nodes")
+        above.set(title=f"{name}, {nodes_of(name)} nodes")
         below.set(xlabel="bend [°]")
     axes[0, 0].set(ylabel="error of the tip [% of L]", ylim=(0.0, None))
     axes[1, 0].set(ylabel="error of its rotation [°]", ylim=(0.0, None))
@@ -60,16 +59,16 @@ def _nodes(figure: Any, rows: Mapping[str, Sequence[Outcome]]) -> None:
                 continue
             axis.plot(nodes, np.maximum(errors, _FLOOR).T, "-", color=colour, lw=0.6, alpha=0.4)
             axis.plot(nodes, np.median(errors, axis=0), "o-", color=colour, lw=2, label=name)
-    for axis, height, label in zip(
-        axes, (3e-3, 3e-3), ("error of the tip [1/L]", "error of its rotation [rad]"), strict=True
-    ):
+    labels = "error of the tip [1/L]", "error of its rotation [rad]"
+    for axis, label in zip(axes, labels, strict=True):
         wide = np.array([8.0, 64.0])
-        axis.plot(wide, height * (8.0 / wide) ** 2, "k--", lw=1, label="second order")
+        axis.plot(wide, 3e-3 * (8.0 / wide) ** 2, "k--", lw=1, label="second order")
         axis.set(xscale="log", yscale="log", xlabel="nodes of a module", ylabel=label)
         axis.set_xticks([8, 16, 32, 64], labels=["8", "16", "32", "64"])
         axis.minorticks_off()
     axes[0].legend(fontsize=8, frameon=False)
 
 
-def _nodes_of(name: str) -> str:
+def nodes_of(name: str) -> str:
+    """The default nodes of a module, from base to tip."""
     return " + ".join(str(nodes) for nodes in SUBJECTS[name]().nodes)

@@ -3,6 +3,7 @@
 import time
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ProcessPoolExecutor
+from contextlib import nullcontext
 from dataclasses import dataclass
 from functools import partial
 from typing import Any, NamedTuple
@@ -19,7 +20,6 @@ from tca_mj.sim import SimulationDiverged
 POSITION, ROTATION = 0.01, np.radians(2.0)  # what a default number of nodes is allowed
 TIMES = (1, 2, 4)  # multiples of the default nodes by which the order is measured
 _ELSEWHERE = 0.05  # error from which on the chain rests in another state [1]
-_NOTHING = 1e-6  # error below which there is no order to measure [1, rad]
 
 
 class Effort(NamedTuple):
@@ -164,17 +164,11 @@ def outcomes(
     tasks = [(name, number) for number in range(effort.cases) for name in names]
     answer = partial(_one, effort=effort, seed=seed)
     result: dict[str, list[Outcome]] = {name: [] for name in names}
-
-    def collect(found: Iterable[Outcome]) -> None:
-        for (name, _), outcome in zip(tasks, found, strict=True):
+    with ProcessPoolExecutor(workers) if workers > 1 else nullcontext() as pool:
+        answers = (map if pool is None else pool.map)(answer, tasks)
+        for (name, _), outcome in zip(tasks, answers, strict=True):
             result[name].append(outcome)
             progress()
-
-    if workers == 1:
-        collect(map(answer, tasks))
-    else:
-        with ProcessPoolExecutor(workers) as pool:
-            collect(pool.map(answer, tasks))
     return result
 
 
@@ -201,30 +195,3 @@ class Spread(NamedTuple):
 def found(rows: Iterable[Outcome]) -> list[tuple[Outcome, Gap]]:
     """The outcomes that have a gap, with it."""
     return [(row, row.gap) for row in rows if row.gap is not None]
-
-
-def within(rows: Iterable[Outcome]) -> bool:
-    """Whether every answer is within 1 % of the length and 2°, and every case has one."""
-    rows = list(rows)
-    gaps = [each for _, each in found(rows)]
-    return len(gaps) == len(rows) and all(
-        each.position < POSITION and each.rotation < ROTATION for each in gaps
-    )
-
-
-def ratios(rows: Iterable[Outcome], field: str) -> tuple[list[float], list[float]]:
-    """Errors at N over those at 2 N, and at 2 N over 4 N, of the cases that were refined.
-
-    Args:
-        rows: Outcomes.
-        field: "position" or "rotation".
-    """
-    first, second = [], []
-    for row in rows:
-        if row.finer is None:
-            continue
-        errors = [getattr(each, field) for each in row.finer]
-        if errors[-1] > _NOTHING:
-            first.append(errors[0] / errors[1])
-            second.append(errors[1] / errors[2])
-    return first, second

@@ -1,9 +1,8 @@
 """The certificate: how far the chain of every module is from theory; compute, print, write."""
 
-import json
 import math
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -11,23 +10,15 @@ from typing import Any
 import numpy as np
 from tqdm import tqdm
 
+from tca_mj import pages
 from tca_mj.certify.claims import Claim, claims
-from tca_mj.certify.figures import draw_figures
-from tca_mj.certify.outcomes import (
-    POSITION,
-    ROTATION,
-    Effort,
-    Outcome,
-    Spread,
-    found,
-    outcomes,
-    ratios,
-    within,
-)
+from tca_mj.certify.figures import draw_figures, nodes_of
+from tca_mj.certify.outcomes import POSITION, ROTATION, Effort, Outcome, Spread, found, outcomes
 from tca_mj.certify.subjects import SUBJECTS
 from tca_mj.machine import machine, versions
 from tca_mj.validation.figures import need_matplotlib
 
+_NOTHING = 1e-6  # error below which there is no order to measure [1, rad]
 _FIGURES = {
     "bend": "Error of the tip's place and rotation over its bend, at the default nodes. Dashed:"
     " 1 % of the length and 2°.",
@@ -76,22 +67,16 @@ def certify(
     if cores > 1:  # the processes' own
         processor += sum(row.seconds for each in rows.values() for row in each)
     result = {
-        "machine": machine(),
-        "versions": versions(),
-        "effort": effort._asdict(),
-        "seed": seed,
+        "machine": machine(), "versions": versions(), "effort": effort._asdict(), "seed": seed,
         "seconds": {"wall": time.perf_counter() - begin, "processor": processor},
         "modules": {name: [asdict(row) for row in each] for name, each in rows.items()},
         "claims": [asdict(claim) for claim in single],
-    }
+    }  # fmt: skip
     if out is not None:
         out.mkdir(parents=True, exist_ok=True)
         draw_figures(rows, out)
-        text = json.dumps(result, indent=1, ensure_ascii=False) + "\n"
-        (out / "report.json").write_text(text, encoding="utf-8")
-        (out / "report.md").write_text(
-            report(rows, single, result, pictures="") + "\n", encoding="utf-8"
-        )
+        page = report(rows, single, result, pictures="")
+        pages.write_result(out, "report", result, page, indent=1)
     return result | {"text": report(rows, single, result)}
 
 
@@ -111,12 +96,10 @@ def report(
         pictures: Path of the folder of the figures as seen from the text, with a slash at its end
             if it is another one; None for no figures.
     """
-    where, effort, seconds = result["machine"], Effort(**result["effort"]), result["seconds"]
-    kept = ", ".join(f"{name} {number}" for name, number in result["versions"].items())
     lines = [
-        f"{where['cpu']}, {where['cores']} cores; {where['system']}", kept, "",
-        f"{effort.cases} cases per module, seed {result['seed']}:"
-        f" {seconds['processor']:.0f} s of processor time.", "",
+        *pages.made_with(result), "",
+        f"{result['effort']['cases']} cases per module, seed {result['seed']}:"
+        f" {result['seconds']['processor']:.0f} s of processor time.", "",
         "## Modules at their default nodes", "", *_table(rows), "", *_remarks(rows), "",
         *_picture("bend", pictures),
         "## Order", "", *_orders(rows), "", *_picture("nodes", pictures),
@@ -130,49 +113,42 @@ def report(
 def _picture(name: str, pictures: str | None) -> list[str]:
     if pictures is None:
         return []
-    caption = _FIGURES[name]
-    return [f"![{caption}]({pictures}accuracy_{name}.png)", "", f"*{caption}*", ""]
+    return pages.picture(_FIGURES[name], f"{pictures}accuracy_{name}.png")
 
 
-def _postures(rows: Sequence[Outcome]) -> Iterator[tuple[str, list[Outcome]]]:
-    for posture in ("hanging", "lying", "standing"):
-        here = [row for row in rows if row.posture == posture]
-        if here:
-            yield posture, here
-
-
-def _table(rows: dict[str, list[Outcome]]) -> Iterator[str]:
-    yield ("| module | nodes | base | cases | tip [% of L]: median, 95 %, worst | rotation [°]"
-           " | TCA length [‰] | tension [mN] | within 1 %, 2° |")  # fmt: skip
-    yield "|---|---|---|---|---|---|---|---|---|"
+def _table(rows: dict[str, list[Outcome]]) -> list[str]:
+    lines = []
     for name, every in rows.items():
         subject = SUBJECTS[name]()
-        nodes = " + ".join(str(each) for each in subject.nodes)
-        for posture, here in _postures(every):
+        for posture in ("hanging", "lying", "standing"):
+            here = [row for row in every if row.posture == posture]
             gaps = [gap for _, gap in found(here)]
-            if not gaps:
-                yield f"| {name} | {nodes} | {posture} | {len(here)} | - | - | - | - | **no** |"
-                continue
-            cells = [
-                _spread((100.0 * gap.position for gap in gaps), 2),
-                _spread((np.degrees(gap.rotation) for gap in gaps), 2),
-                _spread((1e3 * gap.strain for gap in gaps), 2),
-                _spread((1e3 * gap.tension for gap in gaps), 2),
-            ]
-            verdict = "yes" if within(here) else f"**no**{_needed(max(subject.nodes), here)}"
-            yield (f"| {name} | {nodes} | {posture} | {len(here)} | {' | '.join(cells)}"
-                   f" | {verdict} |")  # fmt: skip
+            verdict = "**no**"
+            if gaps:
+                verdict = "yes" if within(here) else f"**no**{_needed(max(subject.nodes), here)}"
+            columns = zip(*((100.0 * gap.position, np.degrees(gap.rotation), 1e3 * gap.strain,
+                             1e3 * gap.tension) for gap in gaps), strict=True)  # fmt: skip
+            cells = [_spread(values) for values in columns] or ["-"] * 4
+            if here:
+                lines.append([name, nodes_of(name), posture, f"{len(here)}", *cells, verdict])
+    heads = ["module", "nodes", "base", "cases", "tip [% of L]: median, 95 %, worst",
+             "rotation [°]", "TCA length [‰]", "tension [mN]", "within 1 %, 2°"]  # fmt: skip
+    return pages.table(heads, lines)
 
 
-def _spread(values: Iterator[float], digits: int) -> str:
-    return ", ".join(f"{each:.{digits}f}" for each in Spread.of(values))
+def _spread(values: Iterable[float]) -> str:
+    return ", ".join(f"{each:.2f}" for each in Spread.of(values))
+
+
+def within(rows: Iterable[Outcome]) -> bool:
+    """Whether every answer is within 1 % of the length and 2°, and every case has one."""
+    gaps = [row.gap for row in rows]
+    return all(gap and gap.position < POSITION and gap.rotation < ROTATION for gap in gaps)
 
 
 def _needed(nodes: int, rows: Sequence[Outcome]) -> str:
     """How many nodes second order asks for."""
-    excess = max(
-        max(gap.position / POSITION, gap.rotation / ROTATION) for _, gap in found(rows)
-    )
+    excess = max(max(gap.position / POSITION, gap.rotation / ROTATION) for _, gap in found(rows))
     return f": {math.ceil(nodes * math.sqrt(excess))} nodes" if excess > 1.0 else ""
 
 
@@ -208,15 +184,24 @@ def _said(row: Outcome) -> str:
     return f"{hot} °C, {row.posture}, {load}{bend}"
 
 
-def _orders(rows: dict[str, list[Outcome]]) -> Iterator[str]:
-    yield ("| module | nodes | cases | tip: N to 2 N, median (range) | 2 N to 4 N | order"
-           " | rotation: N to 2 N | 2 N to 4 N | order |")  # fmt: skip
-    yield "|---|---|---|---|---|---|---|---|---|"
+def _ratios(rows: Iterable[Outcome], field: str) -> tuple[list[float], list[float]]:
+    """Errors at N over those at 2 N, and at 2 N over 4 N, of the cases that were refined.
+
+    Args:
+        rows: Outcomes.
+        field: "position" or "rotation".
+    """
+    finer = [[getattr(each, field) for each in row.finer] for row in rows if row.finer]
+    kept = [errors for errors in finer if errors[-1] > _NOTHING]
+    return [one / two for one, two, _ in kept], [two / four for _, two, four in kept]
+
+
+def _orders(rows: dict[str, list[Outcome]]) -> list[str]:
+    lines = []
     for name, every in rows.items():
-        nodes = SUBJECTS[name]().nodes[0]
-        cells, count = [], 0
+        nodes, cells, count = SUBJECTS[name]().nodes[0], [], 0
         for field in ("position", "rotation"):
-            pair = ratios(every, field)
+            pair = _ratios(every, field)
             count = max(count, len(pair[0]))
             if not pair[0]:
                 cells += ["-", "-", "-"]
@@ -224,14 +209,14 @@ def _orders(rows: dict[str, list[Outcome]]) -> Iterator[str]:
             cells += [f"{np.median(each):.2f} ({min(each):.2f} to {max(each):.2f})"
                       for each in pair]  # fmt: skip
             cells.append(f"{np.log2(np.median(pair[1])):.2f}")
-        yield f"| {name} | {nodes}, {2 * nodes}, {4 * nodes} | {count} | {' | '.join(cells)} |"
+        lines.append([name, f"{nodes}, {2 * nodes}, {4 * nodes}", f"{count}", *cells])
+    heads = ["module", "nodes", "cases", "tip: N to 2 N, median (range)", "2 N to 4 N", "order",
+             "rotation: N to 2 N", "2 N to 4 N", "order"]  # fmt: skip
+    return pages.table(heads, lines)
 
 
-def _checks(rows: dict[str, list[Outcome]]) -> Iterator[str]:
-    yield ("| module | two solvers of the theory: largest distance of the tips [m] | what shear"
-           " would move the tip [% of L]: median, 95 %, worst | simulation from the cold against"
-           " rest [% of L] | velocity left [rad/s] |")  # fmt: skip
-    yield "|---|---|---|---|---|"
+def _checks(rows: dict[str, list[Outcome]]) -> list[str]:
+    lines = []
     for name, every in rows.items():
         solvers = [row.solvers for row in every if row.solvers is not None]
         shear = [100.0 * row.shear.position for row in every if row.shear is not None]
@@ -242,19 +227,20 @@ def _checks(rows: dict[str, list[Outcome]]) -> Iterator[str]:
         if split:
             apart += (f"; in {len(split)} each found one of two states, and the chain has the"
                       f" other too, to {100 * max(split):.2f} %")  # fmt: skip
-        cells = [
-            apart,
-            _spread(iter(shear), 2) if shear else "-",
+        lines.append([
+            name, apart, _spread(shear) if shear else "-",
             f"{max(run):.4f} ({len(run)} cases)" if run else "-",
             f"{max(velocity):.0e}" if velocity else "-",
-        ]
-        yield f"| {name} | {' | '.join(cells)} |"
+        ])  # fmt: skip
+    return pages.table([
+        "module", "two solvers of the theory: largest distance of the tips [m]",
+        "what shear would move the tip [% of L]: median, 95 %, worst",
+        "simulation from the cold against rest [% of L]", "velocity left [rad/s]",
+    ], lines)  # fmt: skip
 
 
-def _claims(single: Sequence[Claim]) -> Iterator[str]:
-    yield "| | case | asked | found | |"
-    yield "|---|---|---|---|---|"
+def _claims(single: Sequence[Claim]) -> list[str]:
     words = {True: "held", False: "**missed**", None: "cannot tell"}
-    for claim in single:
-        yield (f"| {claim.group} | {claim.what} | {claim.asked} | {claim.found}"
-               f" | {words[claim.held]} |")  # fmt: skip
+    rows = ([claim.group, claim.what, claim.asked, claim.found, words[claim.held]]
+            for claim in single)  # fmt: skip
+    return pages.table(["", "case", "asked", "found", ""], rows)

@@ -11,15 +11,13 @@ from dataclasses import dataclass
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
+from tca_mj.checks import Array
+from tca_mj.model.at_rest import NotSettledError
 from tca_mj.model.part import Part
-from tca_mj.model.settle import NotSettledError
 from tca_mj.model.smooth import SmoothBody
 from tca_mj.rod.problem import StrandLaw
 from tca_mj.sim import Simulation
-
-Array = NDArray[np.float64]
 
 _TIMESTEP = 20e-3  # pseudo-time between two looks at the loads [s]
 _DAMPING = (2.0, 8.0, 32.0)  # damping times of the joints over it, tried one after the other
@@ -48,7 +46,7 @@ class Load:
     gravity: Array
 
 
-@dataclass(frozen=True, kw_only=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False)
 class Rest:
     """A part at rest.
 
@@ -132,12 +130,12 @@ def run(
         if time > _HEATING and left < _QUIET:
             break
     mujoco.mj_forward(sim.model, sim.data)
-    frames = sim.data.xmat[hands].reshape(-1, 3, 3).copy()
-    found = Rest(
-        position=sim.data.xpos[hands].copy(), rotation=frames,
-        length=sim.length, tension=np.maximum(sim.tension - 1e-9, 0.0),
-    )  # fmt: skip
-    return found, left
+    return Rest(*_place(sim.data, hands), sim.length, np.maximum(sim.tension - 1e-9, 0.0)), left
+
+
+def _place(data: mujoco.MjData, bodies: Sequence[int]) -> tuple[Array, Array]:
+    """Places and frames of bodies."""
+    return data.xpos[bodies].copy(), data.xmat[bodies].reshape(-1, 3, 3).copy()
 
 
 def _hand(tip: str) -> str:
@@ -249,11 +247,5 @@ class _Body:
         worst = float(np.abs(left).max())
         if not worst < _TOLERANCE or not self._stable(slope):
             raise NotSettledError(worst)
-        data = self.data
         length = self._body.at(q).length + self._more
-        return Rest(
-            position=data.xpos[self._hands].copy(),
-            rotation=data.xmat[self._hands].reshape(-1, 3, 3).copy(),
-            length=length,
-            tension=self._pull(length)[0],
-        )
+        return Rest(*_place(self.data, self._hands), length, self._pull(length)[0])

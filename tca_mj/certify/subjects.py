@@ -16,7 +16,7 @@ from tca_mj.modules.twisting import TwistingSpec, twisting_module
 from tca_mj.robots.arm import ArmSpec, arm
 from tca_mj.rod import BeamSpec, Segment
 from tca_mj.rod.problem import StrandLaw
-from tca_mj.routes import parallel
+from tca_mj.routes import Route, parallel
 from tca_mj.tca import TcaSpec
 
 # Axes of the fingers' bases in the mount, as columns: z to its +x or -x, x to its -z.
@@ -90,9 +90,9 @@ def _tcas(build: Callable[[int], Part]) -> tuple[TcaSpec, ...]:
     return tuple(tca.spec for tca in build(1).tcas)
 
 
-def _loaded(body: BeamSpec, tcas: Sequence[TcaSpec]) -> BeamSpec:
-    """A body that carries the mass of its TCAs."""
-    more = sum(tca.mass for tca in tcas) / body.length
+def _loaded(body: BeamSpec, tcas: Sequence[TcaSpec], share: float = 1.0) -> BeamSpec:
+    """A body that carries the mass of its TCAs, or a share of it."""
+    more = sum(tca.mass for tca in tcas) * share / body.length
     return replace(body, line_density=body.line_density + more)
 
 
@@ -100,38 +100,34 @@ def _finer(spec: Any, times: int) -> Any:
     return replace(spec, nodes=times * spec.nodes)
 
 
-def _bending(spec: BendingSpec) -> Subject:
+def _module(
+    module: Callable[[Any], Part], spec: Any, routes: Sequence[Route], what: str, force: float,
+    moment: float,
+) -> Subject:  # fmt: skip
+    """A module of one body, its TCAs on routes through it."""
+
     def build(times: int) -> Part:
-        return bending_module(_finer(spec, times))
+        return module(_finer(spec, times))
 
     def limbs(laws: Sequence[StrandLaw]) -> tuple[Limb, ...]:
-        body = _loaded(spec.body, tcas)
-        segment = Segment(body, parallel(spec.count, spec.offset), laws)
-        return (Limb((segment,), (tuple(range(spec.count)),), ("body",)),)
+        segment = Segment(_loaded(spec.body, tcas), routes, laws)
+        return (Limb((segment,), (tuple(range(len(routes))),), ("body",)),)
 
     tcas = _tcas(build)
-    return Subject(
-        what=f"bending module, {spec.count} parallel TCAs", nodes=(spec.nodes,),
-        build=build, tcas=tcas, limbs=limbs,
-        force=5e-3, moment=2e-5,
-    )  # fmt: skip
+    return Subject(what=what, nodes=(spec.nodes,), build=build, tcas=tcas, limbs=limbs,
+                   force=force, moment=moment)  # fmt: skip
+
+
+def _bending(spec: BendingSpec) -> Subject:
+    what = f"bending module, {spec.count} parallel TCAs"
+    routes = parallel(spec.count, spec.offset)
+    return _module(bending_module, spec, routes, what, force=5e-3, moment=2e-5)
 
 
 def _twisting(spec: TwistingSpec) -> Subject:
-    def build(times: int) -> Part:
-        return twisting_module(_finer(spec, times))
-
-    def limbs(laws: Sequence[StrandLaw]) -> tuple[Limb, ...]:
-        segment = Segment(_loaded(spec.body, tcas), (spec.route,), laws)
-        return (Limb((segment,), ((0,),), ("body",)),)
-
-    tcas = _tcas(build)
     how = "double helix of 2.5 turns" if spec.double else f"helix of {spec.turns:g} turns"
-    return Subject(
-        what=f"twisting module, {how}", nodes=(spec.nodes,),
-        build=build, tcas=tcas, limbs=limbs,
-        force=2e-2, moment=1e-4,
-    )  # fmt: skip
+    what = f"twisting module, {how}"
+    return _module(twisting_module, spec, (spec.route,), what, force=2e-2, moment=1e-4)
 
 
 def _finger(spec: FingerPairSpec) -> Subject:
@@ -144,8 +140,7 @@ def _finger(spec: FingerPairSpec) -> Subject:
         return tension, 2.0 * slope
 
     def limbs(laws: Sequence[StrandLaw]) -> tuple[Limb, ...]:
-        body = replace(spec.body, line_density=spec.body.line_density
-                       + tcas[0].mass / 2.0 / spec.body.length)  # fmt: skip
+        body = _loaded(spec.body, tcas, share=0.5)
         place = (0.0, 0.0, spec.thickness / 2.0)
         strands = ((spec.route,), (partial(halved, laws[0]),))
         return tuple(

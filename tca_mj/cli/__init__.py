@@ -6,22 +6,19 @@ from collections.abc import Sequence
 
 import tca_mj
 from tca_mj.cli import check, learn, play
-from tca_mj.cli.arguments import ALGORITHMS, POLICIES
+from tca_mj.cli.arguments import ALGORITHMS, POLICIES, filled
 from tca_mj.cli.play import outcome, speed_table
 
 __all__ = ["ALGORITHMS", "POLICIES", "main", "outcome", "speed_table"]
 
 _EXAMPLES = """\
 examples:
-  tca-mj demo pick-and-place                    the arm puts a screwdriver into a cup
-  tca-mj demo pick-and-place --option object=pcb --seed 3 --out runs/board
-  tca-mj demo tetrapod                          the tetrapod crawls, walks, shimmies and lies down
-  rerun runs/board/rollout.rrd                  look at what happened
-  tca-mj list                                   the tasks
-  tca-mj view TCA/ArmPickPlace-v0               watch it in a window
-  tca-mj train TCA/TetrapodWalk-v0 --algo cma   search a faster gait
-  tca-mj eval scripted --task TCA/TetrapodWalk-v0 --out runs/walk     how good a policy is
-  tca-mj demo --policy scripted --task TCA/BendReach-v0     any policy, recorded and filmed
+  tca-mj list                                   the tasks, their options, demos and policies
+  tca-mj demo {demo} --out runs/demo    an episode, recorded and filmed
+  rerun runs/demo/rollout.rrd                   look at what happened
+  tca-mj view {task}               watch it in a window
+  tca-mj train TASK --algo sac                  learn a task
+  tca-mj eval scripted --task TASK              how good a policy is
   tca-mj bench --out runs/bench                 how fast it is on this machine
   tca-mj validate tca --out runs/validation     the models against what is published
   tca-mj certify --out runs/certificate         the chains against the theory of rods
@@ -41,13 +38,17 @@ def main(argv: Sequence[str] | None = None) -> int:
     try:
         return arguments.run(arguments)
     except KeyboardInterrupt:
-        print("interrupted", file=sys.stderr)
+        print("; ".join(["interrupted", *arguments.kept]), file=sys.stderr)
         return 130
+    except (ConnectionError, FileNotFoundError, ImportError, ValueError) as error:
+        hint = arguments.needs if isinstance(error, ImportError) else ""
+        print(f"tca-mj {arguments.command}: {error}{hint}", file=sys.stderr)
+        return 2
 
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
-        prog="tca-mj", description=tca_mj.__doc__.splitlines()[0], epilog=_EXAMPLES,
+        prog="tca-mj", description=tca_mj.__doc__.splitlines()[0], epilog=filled(_EXAMPLES),
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("--version", action="version", version=f"tca-mj {tca_mj.__version__}")

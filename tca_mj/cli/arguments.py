@@ -6,10 +6,11 @@ An argument that its type refuses ends the program with code 2 and the reason.
 import argparse
 import os
 from collections.abc import Callable
+from inspect import cleandoc
 from pathlib import Path
 from typing import Any, TypeAlias
 
-from tca_mj.registry import find_task
+from tca_mj.registry import DEMOS, TASKS, find_task
 
 POLICIES = ("scripted", "off", "random")
 ALGORITHMS = ("cma", "ppo", "sac", "td3")
@@ -23,25 +24,39 @@ def add_command(
     run: Callable[[argparse.Namespace], int],
     *,
     help: str,
-    text: str | None = None,
+    extra: str = "",
 ) -> argparse.ArgumentParser:
     """Adds a command, still without arguments.
 
     Args:
         commands: Where to.
         name: What one types.
-        run: What it does with its arguments; returns the exit code.
+        run: What it does with its arguments; returns the exit code. Its docstring is the command's
+            help, as ``filled`` completes it. Errors of the user's it leaves to ``main``, and in the
+            list ``kept`` of its arguments it notes what is left if it is broken off.
         help: One line for the list of commands.
-        text: What its own help says, line by line as it stands here; None for nothing.
+        extra: Extra of the package that it needs, to be named where something is not installed.
 
     Returns:
         The parser of its arguments.
     """
     parser = commands.add_parser(
-        name, help=help, description=text, formatter_class=argparse.RawDescriptionHelpFormatter
+        name, help=help, description=filled(cleandoc(run.__doc__ or "")),
+        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.set_defaults(run=run)
+    needs = f"; pip install 'tca-mj[{extra}]'" if extra else ""
+    parser.set_defaults(run=run, command=name, kept=[], needs=needs)
     return parser
+
+
+def add(parser: argparse._ActionsContainer, name: str, help: str, **more: Any) -> None:
+    """Adds an argument, of the kind that it is in all commands: see ``_KINDS``."""
+    parser.add_argument(name, help=help, **{**_KINDS.get(name, {}), **more})
+
+
+def filled(text: str) -> str:
+    """A help's text with the first task for ``{task}`` and the first demo for ``{demo}``."""
+    return text.format(task=TASKS[0].id, demo=next(iter(DEMOS)))
 
 
 def parse_seed(text: str) -> int:
@@ -107,3 +122,14 @@ def parse_folder(text: str) -> Path:
 def task_name(task: str) -> str:
     """Name of a task's folder."""
     return task.rpartition(":")[2].rpartition("/")[2].rpartition("-v")[0]
+
+
+_TASK = {"type": parse_task, "metavar": "TASK"}
+_KINDS: dict[str, dict[str, Any]] = {
+    "task": _TASK,
+    "--task": _TASK,
+    "--out": {"type": parse_folder},
+    "--seed": {"type": parse_seed, "default": 0},
+    **dict.fromkeys(("--episodes", "--steps", "--workers", "--envs", "--seeds"),
+                    {"type": parse_count}),
+}

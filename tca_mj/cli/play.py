@@ -5,55 +5,15 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from tca_mj.cli.arguments import (
-    POLICIES,
-    Commands,
-    add_command,
-    parse_folder,
-    parse_option,
-    parse_seed,
-    parse_task,
-    task_name,
-)
-from tca_mj.registry import DEMOS, TASKS, find_task, task_class
-
-_DEMO = """\
-Runs one scripted episode, or with --policy and --task one of any policy in any task, and writes
-into the folder --out:
-  summary.json   success, energy, peak temperatures, duration, versions, machine
-  rollout.rrd    everything over time; open it with `rerun rollout.rrd`
-  rollout.mp4    a film (needs OpenGL and `pip install 'tca-mj[demo]'`)
-  rollout.png    power, temperature, tension and bend (needs `pip install 'tca-mj[demo]'`)
-
-Exit code: 0 if the episode is a success (a gait: it came to the end of its time), 1 if not, 2 if
-the command was wrong, 130 after Ctrl-C, which keeps what was recorded until then.
-
-examples:
-  tca-mj demo pick-and-place --option object=pcb
-  tca-mj demo pick-and-place --seed 7 --no-video      much faster
-  tca-mj demo tetrapod --option randomise_friction=0.2 --seed 3
-  tca-mj demo --policy scripted --task TCA/TetrapodWalk-v0
-  tca-mj demo --policy runs/train/TetrapodWalk-cma/best.json --task TCA/TetrapodWalk-v0
-  tca-mj demo --policy scripted --task my_robots:Mine/Reach-v0
-"""
-
-_VIEW = """\
-Opens a window in which the task runs. Space starts and pauses, backspace begins the next episode,
-= and - change the speed, ] goes to the next camera, F1 lists all keys.
-
-Policies: scripted (the task's own), off (no power), random, the name of one that comes with the
-package (`tca-mj list` shows them), or the file of a trained one.
-
-examples:
-  tca-mj view TCA/ArmPickPlace-v0
-  tca-mj view TCA/ArmPickPlace-v0 --policy random --seed 1
-"""
+from tca_mj.cli.arguments import POLICIES, Commands, add, add_command, parse_option, task_name
+from tca_mj.pages import table
+from tca_mj.registry import DEMOS, TASKS, find_task, make, task_class
 
 _NO_DISPLAY = """\
 tca-mj view: there is no screen to open a window on ({reason}).
 Without a screen you can
   * record the task and look at the recording on any machine:
-      tca-mj demo pick-and-place --out runs/demo
+      tca-mj demo --policy scripted --task {task} --out runs/demo
       rerun runs/demo/rollout.rrd
   * log in with a remote desktop, or with X forwarding (ssh -X)
   * run it on a screen that only exists in memory, for a test:
@@ -63,63 +23,55 @@ Without a screen you can
 
 def add_commands(commands: Commands) -> None:
     """Adds demo, list and view."""
-    demo = add_command(
-        commands, "demo", _demo, help="run a scripted demo and record it", text=_DEMO
-    )
-    demo.add_argument("name", nargs="?", choices=list(DEMOS), help="which demo")
-    demo.add_argument("--policy", help=f"{', '.join(POLICIES)}, a shipped one, a file or a run")
-    demo.add_argument("--task", type=parse_task, metavar="TASK", help="the policy's task")
-    _add_options(demo)
-    demo.add_argument("--seed", type=parse_seed, default=0, help="of the episode; default 0")
-    demo.add_argument("--out", type=parse_folder, help="folder; default runs/demo/TASK")
-    demo.add_argument(
-        "--video", action=argparse.BooleanOptionalAction, default=True,
-        help="make the film, which takes most of the time",
-    )
+    demo = add_command(commands, "demo", _demo, help="run a scripted demo and record it")
+    add(demo, "name", "which demo", nargs="?", choices=list(DEMOS))
+    add(demo, "--policy", f"{', '.join(POLICIES)}, a shipped one, a file or a run")
+    add(demo, "--task", "the policy's task")
+    add(demo, "--out", "folder; default runs/demo/TASK")
+    add(demo, "--video", "make the film, which takes most of the time",
+        action=argparse.BooleanOptionalAction, default=True)  # fmt: skip
 
     tasks = add_command(commands, "list", _list, help="list the tasks, with their spaces")
-    tasks.add_argument(
-        "task", nargs="*", type=parse_task, metavar="TASK", help="only these, or module:id"
-    )
+    add(tasks, "task", "only these, or module:id", nargs="*")
 
-    view = add_command(commands, "view", _view, help="watch a task in a window", text=_VIEW)
-    view.add_argument("task", type=parse_task, metavar="TASK", help="its id")
-    view.add_argument(
-        "--policy", default="scripted", help=f"{', '.join(POLICIES)}, a shipped one or a file"
-    )
-    _add_options(view)
-    view.add_argument(
-        "--seed", type=parse_seed, default=0, help="seed of the first episode; default 0"
-    )
-
-
-def _add_options(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        "--option", action="append", default=[], type=parse_option, metavar="NAME=VALUE",
-        dest="options", help="an option of the task's reset; may be given several times",
-    )
+    view = add_command(commands, "view", _view, help="watch a task in a window")
+    add(view, "task", "its id")
+    add(view, "--policy", f"{', '.join(POLICIES)}, a shipped one or a file", default="scripted")
+    for parser in (demo, view):
+        add(parser, "--seed", "of the first episode; default 0")
+        add(parser, "--option", "an option of the task's reset; may be given several times",
+            action="append", default=[], type=parse_option, metavar="NAME=VALUE",
+            dest="options")  # fmt: skip
 
 
 def _demo(arguments: argparse.Namespace) -> int:
+    """Runs one scripted episode, or with --policy and --task one of any policy in any task, and
+    writes into the folder --out:
+      summary.json   success, energy, peak temperatures, duration, versions, machine
+      rollout.rrd    everything over time; open it with `rerun rollout.rrd`
+      rollout.mp4    a film (needs OpenGL and `pip install 'tca-mj[demo]'`)
+      rollout.png    power, temperature, tension, bend (needs `pip install 'tca-mj[demo]'`)
+
+    Exit code: 0 if the episode is a success (a gait: it came to the end of its time), 1 if not, 2
+    if the command was wrong, 130 after Ctrl-C, which keeps what was recorded until then.
+
+    examples:
+      tca-mj demo {demo} --seed 7 --no-video      much faster
+      tca-mj demo --policy scripted --task {task} --option NAME=VALUE
+      tca-mj demo --policy runs/train/FOLDER --task my_robots:Mine/Reach-v0
+    """
     from tca_mj.agents.demo import play
 
     named = arguments.name is not None
     if named == (arguments.policy is not None) or named == (arguments.task is not None):
-        print("tca-mj demo: give a demo's name, or --policy and --task", file=sys.stderr)
-        return 2
+        raise ValueError("give a demo's name, or --policy and --task")
     task = DEMOS[arguments.name] if named else arguments.task
     out = arguments.out or Path("runs/demo") / (arguments.name or task_name(task))
-    try:
-        summary = play(
-            task, "scripted" if named else arguments.policy, seed=arguments.seed, out=out,
-            options=dict(arguments.options), video=arguments.video,
-        )  # fmt: skip
-    except KeyboardInterrupt:
-        print(f"interrupted; what was recorded is in {out}", file=sys.stderr)
-        return 130
-    except (FileNotFoundError, ValueError) as error:
-        print(f"tca-mj demo: {error}", file=sys.stderr)
-        return 2
+    arguments.kept.append(f"what was recorded is in {out}")
+    summary = play(
+        task, "scripted" if named else arguments.policy, seed=arguments.seed, out=out,
+        options=dict(arguments.options), video=arguments.video,
+    )  # fmt: skip
     if len(summary.get("speeds", ())) > 1:
         print(speed_table(summary))
     print(outcome(summary))
@@ -141,25 +93,22 @@ def outcome(summary: dict[str, Any]) -> str:
 
 def speed_table(summary: dict[str, Any]) -> str:
     """Headway of a demo's phases against what is published, as Markdown."""
-    lines = ["| stage | time | distance | speed | published |", "|---|---|---|---|---|"]
-    for phase, row in zip(summary["phases"], summary["speeds"], strict=True):
-        published = "" if row["published"] is None else f"{1e3 * row['published']:.2f} mm/s"
-        lines.append(
-            f"| {row['name']} | {phase['duration']:.0f} s | {1e3 * row['distance']:.0f} mm |"
-            f" {1e3 * row['speed']:.2f} mm/s | {published} |"
-        )
-    return "\n".join(lines)
+    rows = [
+        [row["name"], f"{phase['duration']:.0f} s", f"{1e3 * row['distance']:.0f} mm",
+         *("" if speed is None else f"{1e3 * speed:.2f} mm/s"
+           for speed in (row["speed"], row["published"]))]
+        for phase, row in zip(summary["phases"], summary["speeds"], strict=True)
+    ]  # fmt: skip
+    return "\n".join(table(["stage", "time", "distance", "speed", "published"], rows))
 
 
 def _list(arguments: argparse.Namespace) -> int:
-    import gymnasium
-
     from tca_mj.agents.policy import SavedPolicy, shipped
 
     policies = {name: SavedPolicy.read(path) for name, path in shipped().items()}
     demos = {task: name for name, task in DEMOS.items()}
     for task in arguments.task or [task.id for task in TASKS]:
-        env: Any = gymnasium.make(task, disable_env_checker=True)
+        env = make(task, disable_env_checker=True)
         about = (type(env.unwrapped).__doc__ or "").strip().partition("\n")[0]
         print(task)
         print(f"    {about}")
@@ -177,6 +126,16 @@ def _list(arguments: argparse.Namespace) -> int:
 
 
 def _view(arguments: argparse.Namespace) -> int:
+    """Opens a window in which the task runs. Space starts and pauses, backspace begins the next
+    episode, = and - change the speed, ] goes to the next camera, F1 lists all keys.
+
+    Policies: scripted (the task's own), off (no power), random, the name of one that comes with the
+    package (`tca-mj list` shows them), or the file of a trained one.
+
+    examples:
+      tca-mj view {task}
+      tca-mj view {task} --policy random --seed 1
+    """
     from tca_mj.envs.viewer import NoDisplay, launch, need_display
 
     try:
@@ -184,14 +143,10 @@ def _view(arguments: argparse.Namespace) -> int:
     except NoDisplay as error:
         print(_NO_DISPLAY.format(reason=error, task=arguments.task), file=sys.stderr)
         return 2
-    import gymnasium
+    from tca_mj.agents.actors import arguments_of
 
-    env = gymnasium.make(arguments.task)
-    try:
-        policy = _policy(arguments.policy, env, arguments.seed)
-    except (FileNotFoundError, ValueError) as error:
-        print(f"tca-mj view: {error}", file=sys.stderr)
-        return 2
+    env = make(arguments.task, **arguments_of(arguments.policy, arguments.task))
+    policy = _policy(arguments.policy, env, arguments.seed)
     options = dict(arguments.options) or None
     print("space starts and pauses, backspace begins the next episode, F1 lists all keys")
     launch(env, policy, seed=arguments.seed, options=options, title=arguments.task)

@@ -1,6 +1,6 @@
 """Controllers: what turns an error into a voltage or a power, n actuators at a time."""
 
-from tca_mj.control.gait import Gait, Thermostat
+from tca_mj.control.gait import Gait
 from tca_mj.control.morph import (
     ClosedLoop,
     Command,
@@ -11,19 +11,9 @@ from tca_mj.control.morph import (
     Phase,
 )
 from tca_mj.control.pi import PiSpec, PiState, pi_rest, pi_step
+from tca_mj.tca.supply import Thermostat
 
 __all__ = [
-    "ClosedLoop",
-    "Command",
-    "Gait",
-    "Measurement",
-    "MorphSequence",
-    "MorphState",
-    "OpenLoop",
-    "Phase",
-    "PiSpec",
-    "PiState",
-    "Thermostat",
-    "pi_rest",
-    "pi_step",
-]
+    "ClosedLoop", "Command", "Gait", "Measurement", "MorphSequence", "MorphState", "OpenLoop",
+    "Phase", "PiSpec", "PiState", "Thermostat", "pi_rest", "pi_step",
+]  # fmt: skip

@@ -1,4 +1,4 @@
-"""Gaits as data: when each TCA of each leg is to be hot; and the heater control that makes it so.
+"""Gaits as data: when each TCA of each leg is to be hot.
 
 A leg is bent by TCAs round it, one after the other: heating them in turn lets its foot run round a
 loop, as a rotating field turns a rotor. A gait says, for each TCA of a leg, where in the cycle it
@@ -7,15 +7,13 @@ heat loss takes, and what brings the TCA to its temperature within a response ti
 the temperature, it heats late cycles no hotter than early ones.
 """
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from tca_mj.tca import HeatSpec
+from tca_mj.checks import Array, floats, require_positive, within
 
-Array = NDArray[np.float64]
 Row = tuple[float, ...]
 Rows = Row | tuple[Row, ...]
 
@@ -47,8 +45,7 @@ class Gait:
     warm: Rows
 
     def __post_init__(self) -> None:
-        if not 0.0 < self.period < math.inf:
-            raise ValueError(f"period must be finite and above 0 s, got {self.period}")
+        require_positive(period=self.period)
         tcas = _table("start", self.start).shape[-1]
         for name in ("offset", "start", "duty", "hot", "warm"):
             value = _table(name, getattr(self, name))
@@ -59,9 +56,7 @@ class Gait:
                 raise ValueError(f"{name} must have {tcas} numbers per leg, got {value.shape[-1]}")
             elif value.ndim == 2 and len(value) != self.legs:
                 raise ValueError(f"{name} must have 1 or {self.legs} rows, got {len(value)}")
-        duty = np.array(self.duty)
-        if not ((duty >= 0.0) & (duty <= 1.0)).all():
-            raise ValueError(f"duty must be between 0 and 1, got {self.duty}")
+        within("duty", self.duty, at_least=0.0, at_most=1.0)
         if not (np.array(self.warm) <= np.array(self.hot)).all():
             raise ValueError(f"warm must be at most hot {self.hot}, got {self.warm}")
 
@@ -79,7 +74,7 @@ class Gait:
         Returns:
             Temperatures of all TCAs, leg by leg, shape (..., legs * TCAs per leg) [°C].
         """
-        phase = np.asarray(phase, dtype=np.float64)[..., None, None]
+        phase = floats("phase", phase)[..., None, None]
         into = (phase + np.array(self.offset)[:, None] - np.array(self.start)) % 1.0
         hot, warm = np.array(self.hot, dtype=np.float64), np.array(self.warm, dtype=np.float64)
         target = np.where(into < np.array(self.duty), hot, warm)
@@ -92,53 +87,7 @@ class Gait:
 
 
 def _table(name: str, rows: Rows) -> Array:
-    try:
-        value = np.asarray(rows, dtype=np.float64)
-    except (TypeError, ValueError):
-        value = np.array(np.nan)
-    if value.ndim not in (1, 2) or not value.size or not np.isfinite(value).all():
+    value = within(name, rows)
+    if value.ndim not in (1, 2) or not value.size:
         raise ValueError(f"{name} must be rows of finite numbers of one length, got {rows}")
     return value
-
-
-@dataclass(frozen=True, kw_only=True, slots=True)
-class Thermostat:
-    """Power that brings TCAs to a temperature: what keeps T* + C (T* - T)/τ, within limits.
-
-    What keeps a bare TCA is λ (T* - T_amb); one in a soft body also warms that, G (T* - T_body).
-
-    Attributes:
-        heat: Thermal constants, arrays of shape (n,).
-        max_power: Largest power of each TCA, shape (n,) or one number [W].
-        response: Time τ in which an error would vanish [s].
-        max_temperature: Limit of every target [°C].
-
-    Raises:
-        ValueError: If a number is not positive.
-    """
-
-    heat: HeatSpec
-    max_power: float | Array
-    response: float = 0.4
-    max_temperature: float = 175.0
-
-    def __post_init__(self) -> None:
-        for name in ("max_power", "response", "max_temperature"):
-            value = np.asarray(getattr(self, name), dtype=np.float64)
-            if not (np.isfinite(value) & (value > 0.0)).all():
-                raise ValueError(f"{name} must be finite and above 0, got {value}")
-
-    def power(
-        self, temperature: ArrayLike, target: ArrayLike, body: ArrayLike | None = None
-    ) -> Array:
-        """Power for TCAs at ``temperature`` that ought to be at ``target``, shape (..., n) [W].
-
-        Args:
-            temperature: Temperatures, shape (..., n) [°C].
-            target: Wanted ones, same shape [°C].
-            body: Temperatures of what they lie in, same shape; None if that is cold [°C].
-        """
-        goal = np.minimum(np.asarray(target, dtype=np.float64), self.max_temperature)
-        error = goal - np.asarray(temperature, dtype=np.float64)
-        steady = self.heat.keeping(goal, self.heat.ambient if body is None else body)
-        return np.clip(steady + self.heat.capacity * error / self.response, 0.0, self.max_power)

@@ -15,6 +15,7 @@ from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from typing import NamedTuple
 
+from tca_mj.checks import number, require_positive
 from tca_mj.control.pi import PiSpec, PiState, pi_rest, pi_step
 
 # A module is steady when it turns less than this in 20 s, Sun, Section 6.2.1 [rad].
@@ -51,7 +52,7 @@ class OpenLoop:
     settle_time: float = 300.0
 
     def __post_init__(self) -> None:
-        _positive(voltage=self.voltage, settle_time=self.settle_time)
+        require_positive(voltage=self.voltage, settle_time=self.settle_time)
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -74,12 +75,9 @@ class ClosedLoop:
     tolerance: float = TOLERANCE
 
     def __post_init__(self) -> None:
-        _positive(tolerance=self.tolerance)
-        if not (float(self.pi.lowest) >= 0.0 and float(self.pi.highest) < math.inf):
-            raise ValueError(
-                f"pi must limit the power from 0 or more, got lowest = {self.pi.lowest}, to"
-                f" something finite, got highest = {self.pi.highest}"
-            )
+        require_positive(tolerance=self.tolerance)
+        number("lowest power of pi", self.pi.lowest, at_least=0.0, unit="W")
+        number("highest power of pi", self.pi.highest, unit="W")
 
 
 class Measurement(NamedTuple):
@@ -195,34 +193,18 @@ class MorphSequence:
     harden_limit: float = 120.0
 
     def __post_init__(self) -> None:
-        _positive(
+        require_positive(
             heat_voltage=self.heat_voltage, margin=self.margin, hold_time=self.hold_time,
             average_time=self.average_time, release_time=self.release_time,
             soften_limit=self.soften_limit, morph_limit=self.morph_limit,
             hold_limit=self.hold_limit, harden_limit=self.harden_limit,
         )  # fmt: skip
-        if not 0.0 <= self.hold_voltage < self.heat_voltage:
-            raise ValueError(
-                f"hold_voltage = {self.hold_voltage} must be from 0 to below heat_voltage ="
-                f" {self.heat_voltage}"
-            )
-        hot = self.soft_temperature + self.margin
-        if not -273.15 < self.rigid_temperature < self.soft_temperature:
-            raise ValueError(
-                f"rigid_temperature = {self.rigid_temperature} must be below soft_temperature ="
-                f" {self.soft_temperature}"
-            )
-        if not hot < self.highest_temperature < math.inf:
-            raise ValueError(
-                f"highest_temperature = {self.highest_temperature} must be above soft_temperature"
-                f" + margin = {hot}"
-            )
-        if not 0.0 <= self.fading_time < math.inf:
-            raise ValueError(f"fading_time = {self.fading_time} must be finite and 0 or more")
-        if not self.hold_limit > self.hold_time:
-            raise ValueError(
-                f"hold_limit = {self.hold_limit} must be above hold_time = {self.hold_time}"
-            )
+        number("hold_voltage", self.hold_voltage, at_least=0.0, below=self.heat_voltage, unit="V")
+        soft, hot = self.soft_temperature, self.soft_temperature + self.margin
+        number("rigid_temperature", self.rigid_temperature, above=-273.15, below=soft, unit="°C")
+        number("highest_temperature", self.highest_temperature, above=hot, unit="°C")
+        number("fading_time", self.fading_time, at_least=0.0, unit="s")
+        number("hold_limit", self.hold_limit, above=self.hold_time, unit="s")
 
     def start(self, target: float | None) -> MorphState:
         """A new sequence, in whatever shape and temperature the module is.
@@ -234,8 +216,8 @@ class MorphSequence:
         Raises:
             ValueError: If the target is not finite.
         """
-        if target is not None and not math.isfinite(target):
-            raise ValueError(f"target = {target} must be finite or None")
+        if target is not None:
+            number("target", target, unit="rad")
         return MorphState(Phase.SOFTEN, target)
 
     def abort(self, state: MorphState) -> MorphState:
@@ -259,7 +241,7 @@ class MorphSequence:
         Raises:
             ValueError: If ``dt`` is not finite and positive.
         """
-        _positive(dt=dt)
+        require_positive(dt=dt)
         if state.over:
             return state, OFF
         if state.phase is Phase.RELEASE:
@@ -322,10 +304,8 @@ class MorphSequence:
         if state.target is None:
             return True
         if isinstance(self.drive, OpenLoop):
-            return (
-                state.phase is not Phase.MORPH
-                or state.elapsed >= self.drive.settle_time - _ROUNDING
-            )
+            settled = state.elapsed >= self.drive.settle_time - _ROUNDING
+            return settled or state.phase is not Phase.MORPH
         error = state.target - self.drive.angle_of(measured.resistance)
         return abs(error) <= self.drive.tolerance
 
@@ -378,9 +358,3 @@ class MorphSequence:
         settled, left = state.power - falling, math.exp(-dt / self.fading_time) * falling
         later = replace(state, power=settled + left, earlier=settled + gain * left)
         return later, max(0.0, settled + left / gain)
-
-
-def _positive(**values: float) -> None:
-    for name, value in values.items():
-        if not 0.0 < value < math.inf:
-            raise ValueError(f"{name} = {value} must be finite and above 0")

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-Array = NDArray[np.float64]
+from tca_mj.checks import Array, require_positive, within
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -42,13 +42,11 @@ class PiSpec:
 
     def __post_init__(self) -> None:
         for name in ("proportional", "integral", "near", "near_proportional", "near_integral"):
-            value = getattr(self, name)
-            if value is not None and not np.all((np.asarray(value) >= 0.0) & np.isfinite(value)):
-                raise ValueError(f"{name} = {value} must be finite and not below 0")
-        if not np.isfinite(self.lowest).all():
-            raise ValueError(f"lowest = {self.lowest} must be finite")
+            if (value := getattr(self, name)) is not None:
+                within(name, value, at_least=0.0)
+        within("lowest", self.lowest)
         if not np.all(np.asarray(self.lowest) < self.highest):
-            raise ValueError(f"highest = {self.highest} must be above lowest = {self.lowest}")
+            raise ValueError(f"highest must be above lowest {self.lowest}, got {self.highest}")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -84,11 +82,8 @@ def pi_step(spec: PiSpec, state: PiState, error: ArrayLike, dt: float) -> tuple[
     Raises:
         ValueError: If an error is not finite, or ``dt`` not above 0 and finite.
     """
-    error = np.asarray(error, dtype=np.float64)
-    if not np.isfinite(error).all():
-        raise ValueError(f"error = {error} must be finite")
-    if not 0.0 < dt < math.inf:
-        raise ValueError(f"dt = {dt} must be finite and above 0")
+    error = within("error", error)
+    require_positive(dt=dt)
     arrives = ~state.arrived & (np.abs(error) <= spec.near) & (np.asarray(spec.near) > 0.0)
     arrived = state.arrived | arrives
     proportional = np.where(arrived, spec.near_proportional, spec.proportional)

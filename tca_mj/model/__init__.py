@@ -1,5 +1,5 @@
 """From beams and routes to MuJoCo: chains of links, tendons, scenes."""
 
-from tca_mj.model.settle import NotSettledError, settle
+from tca_mj.model.at_rest import NotSettledError, settle
 
 __all__ = ["NotSettledError", "settle"]

@@ -12,14 +12,14 @@ changed while the simulation runs, and MuJoCo 4 no longer has it.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
-from tca_mj.checks import require_count
-from tca_mj.rod.beam import BeamSpec
+from tca_mj.checks import Array, require_count
+from tca_mj.model.surface import surface
+from tca_mj.rod.beam import BeamSpec, Outline
 from tca_mj.rod.lie import quaternion_exp, quaternion_matrix
 
 Motion = Literal["stretch", "bend_x", "bend_y", "twist"]
@@ -53,7 +53,7 @@ class Chain:
     piece: float
     motions: tuple[Motion, ...]
     pieces: tuple[mujoco.MjsBody, ...]
-    points: NDArray[np.float64]
+    points: Array
     joints: tuple[dict[Motion, str], ...]
 
     @property
@@ -70,8 +70,17 @@ class Chain:
         """z of the piece's point in the piece's own frame [m]."""
         return 0.0 if piece == 0 else self.piece / 2.0
 
+    def extent(self, piece: int) -> float:
+        """Length of a piece; the first and the last one are half as long as the others [m]."""
+        return self.piece * (0.5 if piece in (0, self.nodes) else 1.0)
 
-def beam(
+    def mark_tip(self, name: str, beyond: float = 0.0) -> None:
+        """Adds the site ``name`` on the axis, ``beyond`` the tip [m]."""
+        z = self.local(self.nodes) + beyond
+        self.tip.add_site(name=name, pos=[0.0, 0.0, z], group=4)
+
+
+def add_chain(
     parent: mujoco.MjsBody,
     spec: BeamSpec,
     *,
@@ -117,10 +126,13 @@ def beam(
                          f" for the curvature {spec.curvature}, got {nodes}")  # fmt: skip
     # Pieces of length h would put the nodes on a smaller circle than the beam's.
     length = cell if half_turn == 0.0 else cell * float(np.tan(half_turn)) / half_turn
-    look = _Look(spec, nodes, tuple(rgba), tuple(friction), collide)
+    look = surface(friction, conaffinity=int(collide), rgba=list(rgba))
+    mass = spec.mass / nodes
+    springs = (spec.stretching, *spec.bending, spec.torsion)
+    stiffness = dict(zip(MOTIONS, springs, strict=True))
 
     piece = parent.add_body(name=f"{name}.piece0", pos=list(pos), quat=list(quat))
-    look.dress(piece, length / 2.0, 0.5, f"{name}.skin0")
+    _add_skin(piece, f"{name}.skin0", length / 2.0, spec.outline, mass=0.5 * mass, **look)
     pieces, joints = [piece], []
     for node in range(nodes):
         reach = length / 2.0 if node == 0 else length
@@ -129,24 +141,18 @@ def beam(
         rest = _hinge_angles(cell * np.array(spec.curvature), reverse=order != kept)
         names = {m: f"{name}.{m}{node}" for m in order}
         for motion in order:
-            _add_joint(piece, spec, cell, motion, rest, names[motion])
+            spring = stiffness[motion] / cell
+            _add_joint(piece, names[motion], motion, spring, spec.damping_time, rest)
         joints.append(names)
         share = 1.0 if node < nodes - 1 else 0.5
-        look.dress(piece, share * length, share, f"{name}.skin{node + 1}")
+        skin = f"{name}.skin{node + 1}"
+        _add_skin(piece, skin, share * length, spec.outline, mass=share * mass, **look)
         pieces.append(piece)
-    return Chain(
-        name=name,
-        beam=spec,
-        cell=cell,
-        piece=length,
-        motions=kept,
-        pieces=tuple(pieces),
-        points=np.linspace(0.0, spec.length, nodes + 1),
-        joints=tuple(joints),
-    )
+    points = np.linspace(0.0, spec.length, nodes + 1)
+    return Chain(name, spec, cell, length, kept, tuple(pieces), points, tuple(joints))
 
 
-def _hinge_angles(turn: NDArray[np.float64], *, reverse: bool) -> NDArray[np.float64]:
+def _hinge_angles(turn: Array, *, reverse: bool) -> Array:
     """Angles of hinges about x, y, z, in this or the reverse order, that make a rotation [rad]."""
     r = quaternion_matrix(quaternion_exp(-turn if reverse else turn))
     angles = np.array([np.arctan2(-r[1, 2], r[2, 2]), np.arcsin(r[0, 2]),
@@ -155,60 +161,26 @@ def _hinge_angles(turn: NDArray[np.float64], *, reverse: bool) -> NDArray[np.flo
 
 
 def _add_joint(
-    body: mujoco.MjsBody,
-    spec: BeamSpec,
-    cell: float,
-    motion: Motion,
-    rest: NDArray[np.float64],
-    name: str,
+    body: mujoco.MjsBody, name: str, motion: Motion, stiffness: float, time: float, rest: Array
 ) -> None:
-    stiffness = {
-        "stretch": spec.stretching,
-        "bend_x": spec.bending[0],
-        "bend_y": spec.bending[1],
-        "twist": spec.torsion,
-    }[motion] / cell
     hinge = motion != "stretch"
     body.add_joint(
         name=name,
         type=mujoco.mjtJoint.mjJNT_HINGE if hinge else mujoco.mjtJoint.mjJNT_SLIDE,
         axis=list(_AXIS[motion]),
         stiffness=[stiffness, 0.0, 0.0],
-        damping=[spec.damping_time * stiffness, 0.0, 0.0],
+        damping=[time * stiffness, 0.0, 0.0],
         springref=rest[_REFERENCE[motion]] if hinge else 0.0,
     )
 
 
-@dataclass(frozen=True, slots=True)
-class _Look:
-    """Mass, shape and surface of the pieces."""
-
-    spec: BeamSpec
-    nodes: int
-    rgba: tuple[float, ...]
-    friction: tuple[float, ...]
-    collide: bool
-
-    def dress(self, body: mujoco.MjsBody, length: float, cells: float, name: str) -> None:
-        outline = self.spec.outline
-        half = length / 2.0
-        if outline.round:
-            shape, size = mujoco.mjtGeom.mjGEOM_CYLINDER, [outline.half_width, half, 0.0]
-        else:
-            shape = mujoco.mjtGeom.mjGEOM_BOX
-            size = [outline.half_width, outline.half_height, half]
-        # Pieces overlap in the bent beam: bit 0 of contype is for objects and ground only.
-        body.add_geom(
-            name=name,
-            type=shape,
-            size=size,
-            pos=[0.0, 0.0, half],
-            mass=self.spec.mass / self.nodes * cells,
-            rgba=list(self.rgba),
-            friction=list(self.friction),
-            contype=0,
-            conaffinity=1 if self.collide else 0,
-            condim=3,
-            solref=[5e-3, 1.0],
-            solimp=[0.95, 0.99, 5e-4, 0.5, 2.0],
-        )
+def _add_skin(
+    body: mujoco.MjsBody, name: str, length: float, outline: Outline, **look: Any
+) -> None:
+    """Mass, shape and surface of a piece."""
+    half = length / 2.0
+    shape, size = mujoco.mjtGeom.mjGEOM_CYLINDER, [outline.half_width, half, 0.0]
+    if not outline.round:
+        shape = mujoco.mjtGeom.mjGEOM_BOX
+        size = [outline.half_width, outline.half_height, half]
+    body.add_geom(name=name, type=shape, size=size, pos=[0.0, 0.0, half], **look)

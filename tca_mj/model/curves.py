@@ -11,13 +11,13 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from tca_mj.checks import Array
 from tca_mj.model.tendon import Crossing
-
-Array = NDArray[np.float64]
+from tca_mj.quadrature import GaussRule
 
 # Gauss's rule along a cell, from 0 to 1: exact to 1e-8 for a quarter of a turn of a helix.
-_POINTS, _WEIGHTS = (np.polynomial.legendre.leggauss(4) + np.array([[1.0], [0.0]])) / 2.0
-_WEIGHT = _WEIGHTS[:, None, None]
+_RULE = GaussRule.of(4)
+_POINTS, _WEIGHT = _RULE.node, _RULE.weight[:, None, None]
 
 
 class Curves:

@@ -45,15 +45,15 @@ class Part:
         if site is None:
             known = [s.name for s in self.spec.sites if ".leg" not in s.name]
             raise ValueError(f"to must be a site of this part, one of {known}, got {to!r}")
-        mine = {item.name for item in self.tcas} | {item.name for item in self.spines}
-        renamed = tuple(tca.renamed(f"{prefix}.") for tca in child.tcas)
+        tcas = tuple(tca.renamed(f"{prefix}.") for tca in child.tcas)
         spines = tuple(spine.renamed(f"{prefix}.") for spine in child.spines)
-        added = [tca.name for tca in renamed] + [spine.name for spine in spines]
-        clash = [name for name in added if name in mine]
+        mine: Sequence[RoutedTca | RoutedSpine] = (*self.tcas, *self.spines)
+        added: Sequence[RoutedTca | RoutedSpine] = (*tcas, *spines)
+        clash = sorted({item.name for item in added} & {item.name for item in mine})
         if clash:
-            raise ValueError(f"prefix must make the TCAs' names unique, {clash} exist already")
+            raise ValueError(f"prefix must make new names, got {prefix!r}: {clash} exist already")
         self.spec.attach(child.spec, site=site, prefix=f"{prefix}.")
-        self.tcas += renamed
+        self.tcas += tcas
         self.spines += spines
         for key, value in child.sites.items():
             if names is None or key in names:
@@ -68,11 +68,17 @@ def new_spec(name: str) -> mujoco.MjSpec:
     """
     spec = mujoco.MjSpec()
     spec.modelname = name
-    spec.compiler.degree = False
     spec.compiler.autolimits = True
+    set_options(spec)
+    return spec
+
+
+def set_options(spec: mujoco.MjSpec) -> None:
+    """Gives a specification the solver settings of ``new_spec``, and radians."""
+    spec.compiler.degree = False
     option = spec.option
     # A diverged state stays as it is, for the one who asks what happened.
-    option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
+    option.disableflags = int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
     option.integrator = mujoco.mjtIntegrator.mjINT_DISCRETE
     option.timestep = 2e-3
     option.solver = mujoco.mjtSolver.mjSOL_NEWTON
@@ -81,4 +87,3 @@ def new_spec(name: str) -> mujoco.MjSpec:
     # what is held from creeping: 7 um/s for a board of 0.9 g between soft fingers, 65 um/s at 10.
     option.cone = mujoco.mjtCone.mjCONE_PYRAMIDAL
     option.impratio = 100.0
-    return spec

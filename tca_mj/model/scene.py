@@ -5,7 +5,7 @@ from pathlib import Path
 
 import mujoco
 
-from tca_mj.model.part import Part, new_spec
+from tca_mj.model.part import Part, set_options
 
 
 def load(path: Path) -> mujoco.MjSpec:
@@ -35,12 +35,7 @@ def scene(arena: Path, robot: Part, objects: Mapping[str, Path], *, name: str = 
         The scene as a part, whose TCAs and named sites are the robot's.
     """
     spec = load(arena)
-    settings = new_spec("scene").option
-    for field in (
-        "integrator", "timestep", "solver", "jacobian", "cone", "impratio", "disableflags",
-    ):  # fmt: skip
-        setattr(spec.option, field, getattr(settings, field))
-    spec.compiler.degree = False
+    set_options(spec)
     origin = spec.worldbody.add_site(name="origin", group=4)
     part = Part(spec)
     part.attach(robot, to="origin", prefix=name)

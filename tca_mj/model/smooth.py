@@ -25,11 +25,11 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from tca_mj.checks import Array
 from tca_mj.model.chain import MOTIONS, Chain, Motion
 from tca_mj.model.curves import Curves, rows, summed
 from tca_mj.model.tendon import Crossing, RoutedTca
-
-Array = NDArray[np.float64]
+from tca_mj.tca.arrays import row
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -57,10 +57,7 @@ class Strained:
 
     def __getitem__(self, i: int) -> "Strained":
         """Body ``i`` of a batch."""
-        return Strained(
-            self.motion[i], self.length[i], self.each[i], self.slope[i],
-            self.sine[i], self.cosine[i], self.cotangent[i],
-        )  # fmt: skip
+        return row(self, i)
 
 
 class SmoothBody:
@@ -143,13 +140,13 @@ class SmoothBody:
 
     def _read_tendons(self, tendons: Sequence[int]) -> None:
         """Where MuJoCo keeps the tendons' derivatives by the cells' joints, in a sparse matrix."""
-        model, row = self._model, {int(dof): i for i, dof in enumerate(self._dof)}
+        model, joint = self._model, {int(dof): i for i, dof in enumerate(self._dof)}
         entries = [
-            (k, i, row[int(model.ten_J_colind[k])])
+            (k, i, joint[int(model.ten_J_colind[k])])
             for i, tendon in enumerate(tendons)
             for first in [int(model.ten_J_rowadr[tendon])]
             for k in range(first, first + int(model.ten_J_rownnz[tendon]))
-            if int(model.ten_J_colind[k]) in row
+            if int(model.ten_J_colind[k]) in joint
         ]
         self._entries = np.array(entries, dtype=np.int64).reshape(-1, 3).T
 
@@ -199,8 +196,8 @@ class SmoothBody:
         imaginary = np.sqrt(x * x + y * y + z * z) + 1e-300
         ratio = np.arctan2(imaginary, real) / imaginary
         factor = self._twice * ratio
-        for row, vector in zip(rows(motion)[1:], (x, y, z), strict=True):
-            np.multiply(vector, factor, out=row)
+        for place, vector in zip(rows(motion)[1:], (x, y, z), strict=True):
+            np.multiply(vector, factor, out=place)
         each, slope = self._curves.lengths(motion)
         length = summed(each, self._tca, self._tcas)
         strained = Strained(motion, length, each, slope, sine, cosine, ratio * real)

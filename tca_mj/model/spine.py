@@ -2,11 +2,12 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
+from typing import Any
 
 from tca_mj.checks import require_count, require_positive
 from tca_mj.model.chain import Chain, Motion
-from tca_mj.rod.beam import torsion_constant
+from tca_mj.rod.beam import BeamSpec, torsion_constant
 from tca_mj.smp import HeaterSpec, SpineSpec
 
 # Shear modulus over Young's modulus, at any temperature: Poisson's ratio 0.35 when glassy, 0.5 when
@@ -36,7 +37,7 @@ class RoutedSpine:
     heater: HeaterSpec
     joints: tuple[tuple[str, float], ...]
     tca: str
-    damping_time: float = field(default=5e-3)
+    damping_time: float = 5e-3
 
     def renamed(self, prefix: str) -> "RoutedSpine":
         """The same with a prefix before all names."""
@@ -95,6 +96,20 @@ def route_spine(
         for motion, joint in node.items()
     ]
     return RoutedSpine(name, spec, heater, tuple(joints), tca, damping_time)
+
+
+def sheath(spec: SpineSpec, share: float, **more: Any) -> BeamSpec:
+    """What a chain has besides its shape-memory spines: tube, wires, what is seen and weighs.
+
+    Args:
+        spec: A spine.
+        share: Stiffness of what is round the spines against bending and twist, over that of one
+            soft spine.
+        **more: The other fields of the beam.
+    """
+    soft = share * spec.smp.rubbery * spec.second_moment
+    along = soft / spec.thickness**2
+    return BeamSpec(bending=(soft, soft), torsion=soft, stretching=along, shearing=along, **more)
 
 
 def lumped_torsion(spec: SpineSpec, places: Sequence[float], nodes: int) -> tuple[float, ...]:

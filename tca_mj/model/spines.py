@@ -7,13 +7,12 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from tca_mj.checks import Array, within
 from tca_mj.model.curves import summed
 from tca_mj.model.smooth import SmoothBody
 from tca_mj.model.spine import RoutedSpine
 from tca_mj.smp import DamageSpec, SpineBank, SpinesState, flag_damage, soft_bending_rate
 from tca_mj.tca.arrays import row, stacked
-
-Array = NDArray[np.float64]
 
 
 class Spines:
@@ -116,14 +115,11 @@ class Spines:
         Raises:
             ValueError: If one has the wrong shape or is not finite.
         """
-        voltage = np.asarray(voltage, dtype=np.float64)
-        fan = np.asarray(fan, dtype=bool)
-        for name, shape in (("voltage", voltage.shape), ("fan", fan.shape)):
-            if shape not in ((), (self.n,)):
-                raise ValueError(f"{name} must have shape ({self.n},), got {shape}")
-        if not np.isfinite(voltage).all():
-            raise ValueError(f"voltage must be finite, got {voltage}")
-        return np.full(self.n, voltage), np.full(self.n, fan)
+        volts, blown = within("voltage", voltage), np.asarray(fan, dtype=bool)
+        for name, array in (("voltage", volts), ("fan", blown)):
+            if array.shape not in ((), (self.n,)):
+                raise ValueError(f"{name} must have shape ({self.n},), got {array.shape}")
+        return np.full(self.n, volts), np.full(self.n, blown)
 
     def advance(
         self,

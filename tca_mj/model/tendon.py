@@ -16,8 +16,8 @@ from dataclasses import dataclass, replace
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
+from tca_mj.checks import Array
 from tca_mj.model.chain import Chain, Motion
 from tca_mj.routes import Helix, Route, leg_length
 from tca_mj.tca import TcaSpec
@@ -97,9 +97,8 @@ def route_tca(
     passes: Sequence[Pass],
     *,
     name: str,
-    sites: int | None = None,
     stretch: float = 0.0,
-    inside: bool = True,
+    ideal: bool = False,
 ) -> RoutedTca:
     """Lays a TCA along passes through chains and gives it a tendon and an actuator.
 
@@ -111,46 +110,36 @@ def route_tca(
         tca: The TCA; its rest length must be that of the route, see ``of_length``.
         passes: Where it runs.
         name: Its name.
-        sites: Points on each chain that hold the TCA, base and tip included; by default all.
         stretch: Pre-stretch [m].
-        inside: Whether the route must stay inside the body's outline.
+        ideal: Whether it is without mass and may leave the body's outline.
 
     Returns:
         The routed TCA.
 
     Raises:
         ValueError: If the route leaves the body, is a helix with less than three sites per turn,
-            has more sites than the chain has pieces, or
-            its length is not the TCA's.
+            or its length is not the TCA's.
     """
-    if not passes:
-        raise ValueError("passes must name at least one leg, got none")
-    length = sum(leg_length(p.leg, p.chain.beam.length, p.chain.beam.curvature) for p in passes)
+    length = path_length(passes)
     if abs(tca.rest_length + stretch - length) > 1e-6 * length:
         raise ValueError(
             f"rest_length + stretch of {name} must be its route's length {length:.6f} m,"
             f" got {tca.rest_length + stretch:.6f} m"
         )
-    width = tca.coil_radius + tca.fibre.radius  # as thick as the coil
+    width = tca.outer_radius
     tendon = spec.add_tendon(name=name, width=width, rgba=[0.1, 0.2, 0.6, 1.0])
     crossings: list[Crossing] = []
     for index, item in enumerate(passes):
-        if inside:
+        if not ideal:
             _check_inside(item, name)
-        _add_mass(item, tca.mass / len(passes))
-        held = _held_points(item.chain, sites, name)
-        offsets = _site_offsets(item, held)
-        for number in range(len(held)) if not item.down else reversed(range(len(held))):
+            _add_mass(item, tca.mass / len(passes))
+        offsets = _site_offsets(item)
+        for number in range(len(offsets))[:: -1 if item.down else 1]:
             site = f"{name}.leg{index}.site{number}"
-            piece = int(held[number])
-            item.chain.pieces[piece].add_site(
-                name=site,
-                pos=[*offsets[number], item.chain.local(piece)],
-                size=[width, width, width],
-                group=4,
-            )
+            pos = [*offsets[number], item.chain.local(number)]
+            item.chain.pieces[number].add_site(name=site, pos=pos, size=[width] * 3, group=4)
             tendon.wrap_site(site)
-        crossings += _crossings(item, held, offsets)
+        crossings += _crossings(item, offsets)
     actuator = spec.add_actuator(name=name)
     actuator.trntype = mujoco.mjtTrn.mjTRN_TENDON
     actuator.target = name
@@ -160,13 +149,25 @@ def route_tca(
     actuator.biasprm = np.zeros(10)
     actuator.forcelimited = 1
     actuator.forcerange = [-1e3, 0.0]  # slack at zero; no real TCA comes near the other bound
-    return RoutedTca(
-        name=name,
-        spec=tca,
-        path_length=length,
-        stretch=stretch,
-        crossings=tuple(crossings),
-    )
+    return RoutedTca(name, tca, length, stretch, tuple(crossings))
+
+
+def lay_tca(
+    spec: mujoco.MjSpec, tca: TcaSpec, passes: Sequence[Pass], *, name: str, ideal: bool = False
+) -> RoutedTca:
+    """``route_tca`` of a TCA cut to the length of its passes."""
+    return route_tca(spec, tca.of_length(path_length(passes)), passes, name=name, ideal=ideal)
+
+
+def path_length(passes: Sequence[Pass]) -> float:
+    """Length of a route in the unloaded bodies [m].
+
+    Raises:
+        ValueError: If it has no leg.
+    """
+    if not passes:
+        raise ValueError("passes must name at least one leg, got none")
+    return sum(leg_length(p.leg, p.chain.beam.length, p.chain.beam.curvature) for p in passes)
 
 
 def _add_mass(item: Pass, mass: float) -> None:
@@ -182,39 +183,27 @@ def _check_inside(item: Pass, name: str) -> None:
         x, y = item.leg.offset(s)
         if not outline.contains(x, y):
             raise ValueError(
-                f"route of {name} must stay inside the body: offset ({x:.5f}, {y:.5f}) m is"
-                f" outside its outline of half size ({outline.half_width}, {outline.half_height}) m"
+                f"route of {name} must stay inside the body's outline of half size"
+                f" ({outline.half_width}, {outline.half_height}) m, got ({x:.5f}, {y:.5f}) m"
             )
 
 
-def _held_points(chain: Chain, sites: int | None, name: str) -> NDArray[np.int64]:
-    """Indices of the pieces that hold the TCA."""
-    pieces = len(chain.pieces)
-    count = pieces if sites is None else sites
-    if not 2 <= count <= pieces:
-        raise ValueError(
-            f"sites of {name} must be between 2 and the {pieces} pieces of {chain.name},"
-            f" got {count}"
-        )
-    return np.unique(np.round(np.linspace(0, pieces - 1, count)).astype(np.int64))
-
-
-def _site_offsets(item: Pass, held: NDArray[np.int64]) -> NDArray[np.float64]:
-    """Offsets of the sites in their pieces' frames, shape (k, 2) [m].
+def _site_offsets(item: Pass) -> Array:
+    """Offsets of the sites, one in each piece's frame, shape (pieces, 2) [m].
 
     The chords of a helix run closer to the axis than the helix. The radius is enlarged so that
     the lever arm about the axis, |r x t|, is that of the helix: R² sin(φ)/chord = a² φ/arc, φ the
     angle between two sites. Beyond a quarter of a turn between them it grows no more.
     """
-    s = item.chain.points[held] / item.chain.beam.length
+    s = item.chain.points / item.chain.beam.length
     offsets = item.leg.offset(s)
     angle = 2.0 * np.pi * abs(item.leg.turns) * float(np.max(np.diff(s)))
     if angle == 0.0 or item.leg.radius == 0.0:
         return offsets
     if angle > 2.0 / 3.0 * np.pi + 1e-9:
         raise ValueError(
-            f"a helix needs at least three sites per turn, got {2.0 * np.pi / angle:.2f}:"
-            f" give {item.chain.name} more nodes or the route fewer turns"
+            f"nodes of {item.chain.name} must give a helix at least three sites per turn,"
+            f" got {2.0 * np.pi / angle:.2f}"
         )
     rise = item.chain.beam.length * float(np.max(np.diff(s)))
     share = min(1.0, 0.5 * np.pi / angle)
@@ -229,27 +218,26 @@ def _site_offsets(item: Pass, held: NDArray[np.int64]) -> NDArray[np.float64]:
 _HINGES: tuple[Motion, ...] = ("bend_x", "bend_y", "twist")  # about x, y, z
 
 
-def _crossings(item: Pass, held: NDArray[np.int64], offsets: NDArray[np.float64]) -> list[Crossing]:
+def _crossings(item: Pass, offsets: Array) -> list[Crossing]:
     """The cells that a leg crosses, from base to tip."""
     chain, points = item.chain, item.chain.points
     scale = chain.piece / chain.cell
     result = []
-    for k in range(len(held) - 1):
-        for node in range(int(held[k]), int(held[k + 1])):  # between two neighbouring sites
-            height = (node + 0.5) * chain.cell
-            below = np.array([*offsets[k], scale * (points[held[k]] - height)])
-            above = np.array([*offsets[k + 1], scale * (points[held[k + 1]] - height)])
-            curving = {
-                motion: _second_derivative(below, above, axis)
-                for axis, motion in enumerate(_HINGES)
-                if motion in chain.joints[node]
-            }
-            span = (node / chain.nodes, (node + 1) / chain.nodes)
-            result.append(Crossing(chain.joints[node], chain.cell, item.leg, span, curving))
+    for node, joints in enumerate(chain.joints):
+        height = (node + 0.5) * chain.cell
+        below = np.array([*offsets[node], scale * (points[node] - height)])
+        above = np.array([*offsets[node + 1], scale * (points[node + 1] - height)])
+        curving = {
+            motion: _second_derivative(below, above, axis)
+            for axis, motion in enumerate(_HINGES)
+            if motion in joints
+        }
+        span = (node / chain.nodes, (node + 1) / chain.nodes)
+        result.append(Crossing(joints, chain.cell, item.leg, span, curving))
     return result
 
 
-def _second_derivative(below: NDArray[np.float64], above: NDArray[np.float64], axis: int) -> float:
+def _second_derivative(below: Array, above: Array, axis: int) -> float:
     """d²|R(θ) above - below|/dθ² at θ = 0, R a rotation about ``axis`` at the origin."""
     across = [i for i in range(3) if i != axis]
     length = float(np.linalg.norm(above - below))

@@ -1,14 +1,15 @@
 """The 3D bending module: a silicone cylinder with three parallel TCAs (Sun, Section 4.1.3)."""
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 from tca_mj.checks import require_count, require_positive
-from tca_mj.model.chain import beam
+from tca_mj.model.chain import add_chain
 from tca_mj.model.part import Part, new_spec
-from tca_mj.model.tendon import route_passes, route_tca
+from tca_mj.model.tendon import lay_tca, route_passes
 from tca_mj.rod.beam import BeamSpec
-from tca_mj.routes import leg_length, parallel
+from tca_mj.routes import Route, parallel
 from tca_mj.tca import CATALOGUE, TcaSpec
 from tca_mj.tca.embedding import SILICONE_DENSITY, silicone_body
 
@@ -19,13 +20,36 @@ SILICONE_SHEAR = SILICONE_YOUNG / 3.0  # incompressible, Sun, Section 5.3 [Pa]
 def silicone_cylinder(length: float, diameter: float, outer_diameter: float) -> BeamSpec:
     """A cylinder of Ecoflex 00-30: the section that carries load, and the body that is seen [m]."""
     return BeamSpec.circular(
-        length=length,
-        diameter=diameter,
-        outer_diameter=outer_diameter,
-        young=SILICONE_YOUNG,
-        shear=SILICONE_SHEAR,
-        density=SILICONE_DENSITY,
+        length=length, diameter=diameter, outer_diameter=outer_diameter,
+        young=SILICONE_YOUNG, shear=SILICONE_SHEAR, density=SILICONE_DENSITY,
+    )  # fmt: skip
+
+
+def straight_module(
+    name: str, body: BeamSpec, nodes: int, tca: TcaSpec, routes: Mapping[str, Route]
+) -> Part:
+    """A soft body with its base at the origin and its axis along z.
+
+    Args:
+        name: Name of the model.
+        body: The body.
+        nodes: Nodes of its chain.
+        tca: The kind of TCA, cut to each of the routes.
+        routes: Routes by the names of their TCAs.
+
+    Returns:
+        A part with these TCAs and the site ``tip``.
+
+    Raises:
+        ValueError: If the geometry cannot be built.
+    """
+    mjspec = new_spec(name)
+    chain = add_chain(mjspec.worldbody, body, nodes=nodes, name="body")
+    chain.mark_tip("tip")
+    tcas = tuple(
+        lay_tca(mjspec, tca, route_passes(chain, route), name=key) for key, route in routes.items()
     )
+    return Part(mjspec, tcas, {"tip": "tip"})
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -91,16 +115,5 @@ def bending_module(spec: BendingSpec | None = None) -> Part:
         ValueError: If the geometry cannot be built.
     """
     spec = spec or BendingSpec()
-    mjspec = new_spec("bending")
-    chain = beam(mjspec.worldbody, spec.body, nodes=spec.nodes, name="body")
-    chain.tip.add_site(name="tip", pos=[0.0, 0.0, chain.local(spec.nodes)], group=4)
-    tcas = tuple(
-        route_tca(
-            mjspec,
-            spec.embedded.of_length(leg_length(route, spec.length)),
-            route_passes(chain, route),
-            name=f"tca{i}",
-        )
-        for i, route in enumerate(parallel(spec.count, spec.offset))
-    )
-    return Part(mjspec, tcas, {"tip": "tip"})
+    routes = {f"tca{i}": route for i, route in enumerate(parallel(spec.count, spec.offset))}
+    return straight_module("bending", spec.body, spec.nodes, spec.embedded, routes)

@@ -8,13 +8,13 @@ and the fingers open. Cold, they close and hold an object without power.
 import math
 from dataclasses import dataclass, field, replace
 
-from tca_mj.checks import require_count, require_positive
-from tca_mj.model.chain import Chain, beam
+from tca_mj.checks import number, require_count, require_positive
+from tca_mj.model.chain import add_chain
 from tca_mj.model.part import Part, new_spec
-from tca_mj.model.tendon import Pass, route_tca
+from tca_mj.model.tendon import Pass, lay_tca
 from tca_mj.modules.bending import SILICONE_YOUNG
 from tca_mj.rod.beam import BeamSpec
-from tca_mj.routes import UTurn, leg_length
+from tca_mj.routes import UTurn
 from tca_mj.tca import CATALOGUE, TcaSpec
 from tca_mj.tca.embedding import SILICONE_DENSITY, silicone_body
 
@@ -72,8 +72,7 @@ class FingerPairSpec:
             layer_young=self.layer_young, closure=self.closure,
         )  # fmt: skip
         require_count(nodes=self.nodes)
-        if not 0.0 <= self.friction < math.inf:
-            raise ValueError(f"friction must be finite and at least 0, got {self.friction}")
+        number("friction", self.friction, at_least=0.0)
 
     @property
     def thickness(self) -> float:
@@ -89,12 +88,11 @@ class FingerPairSpec:
         whole = self._plate(self.thickness, self.layer_young)
         gap = self._plate(self.core, self.layer_young)
         core = self._plate(self.core, SILICONE_YOUNG)
+        plates = (core, whole, gap)
+        bend_x, bend_y = ((a + b - c) for a, b, c in zip(*(p.bending for p in plates), strict=True))
         return replace(
             whole,
-            bending=(
-                core.bending[0] + whole.bending[0] - gap.bending[0],
-                core.bending[1] + whole.bending[1] - gap.bending[1],
-            ),
+            bending=(bend_x, bend_y),
             torsion=core.torsion + whole.torsion - gap.torsion,
             stretching=core.stretching + whole.stretching - gap.stretching,
             shearing=core.shearing + whole.shearing - gap.shearing,
@@ -103,13 +101,9 @@ class FingerPairSpec:
 
     def _plate(self, thickness: float, young: float) -> BeamSpec:
         return BeamSpec.box(
-            length=self.length / 2.0,
-            width=thickness,
-            height=self.width,
-            young=young,
-            shear=young / 3.0,
-            density=SILICONE_DENSITY,
-        )
+            length=self.length / 2.0, width=thickness, height=self.width,
+            young=young, shear=young / 3.0, density=SILICONE_DENSITY,
+        )  # fmt: skip
 
     @property
     def embedded(self) -> TcaSpec:
@@ -143,38 +137,18 @@ def finger_pair(spec: FingerPairSpec | None = None) -> Part:
     ring = spec.length / (2.0 * spec.closure)  # radius of the closed ring's centre line
     fingers = []
     for side in range(2):
-        fingers.append(
-            beam(
-                mjspec.worldbody,
-                body,
-                nodes=spec.nodes,
-                name=f"finger{side}",
-                pos=[0.0, 0.0, spec.thickness / 2.0],
-                quat=_FRAMES[side],
-                friction=(spec.friction, 0.005, 0.0001),
-            )
-        )
-        fingers[side].tip.add_site(
-            name=f"tip{side}", pos=[0.0, 0.0, fingers[side].local(spec.nodes)], group=4
-        )
-    mjspec.worldbody.add_site(
-        name="grasp", pos=[0.0, 0.0, spec.thickness / 2.0 + 2.0 * ring], group=4
-    )
-    routed = route_tca(
-        mjspec,
-        spec.embedded.of_length(4.0 * leg_length(route.out, body.length, body.curvature)),
-        _passes(fingers, route),
-        name="tca",
-    )
-    return Part(mjspec, (routed,), {"tip0": "tip0", "tip1": "tip1", "grasp": "grasp"})
-
-
-def _passes(fingers: list[Chain], route: UTurn) -> tuple[Pass, ...]:
-    """From the tip of finger 0 to that of finger 1 on one side, and back on the other."""
+        finger = add_chain(
+            mjspec.worldbody, body, nodes=spec.nodes, name=f"finger{side}",
+            pos=[0.0, 0.0, spec.thickness / 2.0], quat=_FRAMES[side],
+            friction=(spec.friction, 0.005, 0.0001),
+        )  # fmt: skip
+        finger.mark_tip(f"tip{side}")
+        fingers.append(finger)
+    grasp = [0.0, 0.0, spec.thickness / 2.0 + 2.0 * ring]
+    mjspec.worldbody.add_site(name="grasp", pos=grasp, group=4)
+    # From the tip of finger 0 to that of finger 1 on one side, and back on the other.
     first, second = fingers
-    return (
-        Pass(first, route.out, down=True),
-        Pass(second, route.back),
-        Pass(second, route.out, down=True),
-        Pass(first, route.back),
-    )
+    there = Pass(first, route.out, down=True), Pass(second, route.back)
+    back = Pass(second, route.out, down=True), Pass(first, route.back)
+    routed = lay_tca(mjspec, spec.embedded, (*there, *back), name="tca")
+    return Part(mjspec, (routed,), {"tip0": "tip0", "tip1": "tip1", "grasp": "grasp"})

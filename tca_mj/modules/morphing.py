@@ -6,15 +6,15 @@ that a positive angle of ``bend_x`` bends the module towards its TCA.
 """
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import mujoco
 
-from tca_mj.checks import require_count, require_positive
-from tca_mj.model.chain import Chain, Motion, beam
+from tca_mj.checks import number, require_count, require_positive
+from tca_mj.model.chain import Chain, Motion, add_chain
 from tca_mj.model.part import Part, new_spec
-from tca_mj.model.spine import route_spine
+from tca_mj.model.spine import route_spine, sheath
+from tca_mj.model.surface import surface
 from tca_mj.model.tendon import route_passes, route_tca
 from tca_mj.rod.beam import BeamSpec, Outline
 from tca_mj.routes import UTurn
@@ -63,8 +63,7 @@ class MorphingSpec:
     def __post_init__(self) -> None:
         require_positive(mass=self.mass, half_width=self.half_width, damping_time=self.damping_time)
         require_count(nodes=self.nodes)
-        if not 0.0 <= self.tip_mass < math.inf:
-            raise ValueError(f"tip_mass must be finite and at least 0, got {self.tip_mass}")
+        number("tip_mass", self.tip_mass, at_least=0.0, unit="kg")
         if "bend_x" not in self.motions:
             raise ValueError(f"motions must contain 'bend_x', got {self.motions}")
 
@@ -72,16 +71,10 @@ class MorphingSpec:
     def body(self) -> BeamSpec:
         """What the chain has besides the shape-memory spine."""
         spine, size = self.spine, self.spine.tca_offset + TUBE_DIAMETER / 2.0
-        soft = _SHEATH * spine.smp.rubbery * spine.second_moment
-        return BeamSpec(
-            length=spine.length,
-            bending=(soft, soft),
-            torsion=soft,
-            stretching=soft / spine.thickness**2,
-            shearing=soft / spine.thickness**2,
-            line_density=self.mass / spine.length,
+        return sheath(
+            spine, _SHEATH, length=spine.length, line_density=self.mass / spine.length,
             outline=Outline(spine.width / 2.0, size, round=False),
-        )
+        )  # fmt: skip
 
     @property
     def sheathed(self) -> TcaSpec:
@@ -106,7 +99,7 @@ def morphing_module(spec: MorphingSpec | None = None) -> Part:
     """
     spec = spec or MorphingSpec()
     mjspec = new_spec("morphing")
-    chain = beam(
+    chain = add_chain(
         mjspec.worldbody, spec.body, nodes=spec.nodes, name="spine", motions=spec.motions,
         rgba=(0.0, 0.0, 0.0, 0.0), collide=False,
     )  # fmt: skip
@@ -131,42 +124,26 @@ def _dress(chain: Chain, spec: MorphingSpec) -> None:
     """What is seen and touched: polymer, protrusions on its inner side, the two legs' tube."""
     spine, radius = spec.spine, TUBE_DIAMETER / 2.0
     box, cylinder = mujoco.mjtGeom.mjGEOM_BOX, mujoco.mjtGeom.mjGEOM_CYLINDER
-    polymer, silicone = (0.86, 0.72, 0.42, 1.0), (0.92, 0.93, 0.95, 0.3)
+    polymer, silicone = [0.86, 0.72, 0.42, 1.0], [0.92, 0.93, 0.95, 0.3]
+    look = surface((0.3, 0.002, 1e-4), mass=0.0)
     held = {round(chain.nodes * i / (_PROTRUSIONS - 1)) for i in range(_PROTRUSIONS)}
-    for number, piece in enumerate(chain.pieces):
-        whole = chain.piece * (0.5 if number in (0, chain.nodes) else 1.0)
+    for index, piece in enumerate(chain.pieces):
+        whole = chain.extent(index)
         middle = whole / 2.0
-        _geom(
-            piece, box, f"polymer{number}", (0.0, 0.0, middle),
-            (spine.width / 2.0, spine.thickness / 2.0, middle), polymer,
+        piece.add_geom(
+            name=f"polymer{index}", type=box, pos=[0.0, 0.0, middle],
+            size=[spine.width / 2.0, spine.thickness / 2.0, middle], rgba=polymer, **look,
         )  # fmt: skip
         for leg, side in enumerate((-1.0, 1.0)):
-            _geom(
-                piece, cylinder, f"tube{leg}.{number}",
-                (side * spec.half_width, -spine.tca_offset, middle), (radius, middle, 0.0),
-                silicone,
+            piece.add_geom(
+                name=f"tube{leg}.{index}", type=cylinder, size=[radius, middle, 0.0],
+                pos=[side * spec.half_width, -spine.tca_offset, middle], rgba=silicone, **look,
             )  # fmt: skip
-        if number in held:
-            at = {0: 1.5e-3, chain.nodes: whole - 1.5e-3}.get(number, middle)
+        if index in held:
+            at = {0: 1.5e-3, chain.nodes: whole - 1.5e-3}.get(index, middle)
             for leg, side in enumerate((-1.0, 1.0)):
-                _geom(
-                    piece, box, f"protrusion{leg}.{number}",
-                    (side * (spine.width / 2.0 - 0.3e-3), -spine.tca_offset + 0.6e-3, at),
-                    (0.5e-3, radius, 1.5e-3), polymer,
+                across = side * (spine.width / 2.0 - 0.3e-3)
+                piece.add_geom(
+                    name=f"protrusion{leg}.{index}", type=box, size=[0.5e-3, radius, 1.5e-3],
+                    pos=[across, -spine.tca_offset + 0.6e-3, at], rgba=polymer, **look,
                 )  # fmt: skip
-
-
-def _geom(
-    body: mujoco.MjsBody,
-    shape: mujoco.mjtGeom,
-    name: str,
-    pos: Sequence[float],
-    size: Sequence[float],
-    rgba: Sequence[float],
-) -> None:
-    """A weightless shape that touches objects and ground, but nothing of the module."""
-    body.add_geom(
-        name=name, type=shape, pos=list(pos), size=list(size), rgba=list(rgba), mass=0.0,
-        contype=0, conaffinity=1, condim=3, friction=[0.3, 0.002, 1e-4],
-        solref=[5e-3, 1.0], solimp=[0.95, 0.99, 5e-4, 0.5, 2.0],
-    )  # fmt: skip

@@ -3,13 +3,11 @@
 import math
 from dataclasses import dataclass, field, replace
 
-from tca_mj.checks import require_count, require_positive
-from tca_mj.model.chain import beam
-from tca_mj.model.part import Part, new_spec
-from tca_mj.model.tendon import route_passes, route_tca
-from tca_mj.modules.bending import silicone_cylinder
+from tca_mj.checks import number, require_count, require_positive
+from tca_mj.model.part import Part
+from tca_mj.modules.bending import silicone_cylinder, straight_module
 from tca_mj.rod.beam import BeamSpec
-from tca_mj.routes import Helix, Route, UTurn, leg_length
+from tca_mj.routes import Helix, Route, UTurn
 from tca_mj.tca import CATALOGUE, TcaSpec
 from tca_mj.tca.embedding import silicone_body
 
@@ -55,13 +53,10 @@ class TwistingSpec:
     def __post_init__(self) -> None:
         require_positive(
             length=self.length, diameter=self.diameter, outer_diameter=self.outer_diameter,
-            radius=self.radius, tube=self.tube,
+            radius=self.radius,
         )  # fmt: skip
         require_count(nodes=self.nodes)
-        if not self.tube > 2.0 * self.tca.outer_radius:
-            raise ValueError(
-                f"tube must be above the TCA's {2.0 * self.tca.outer_radius} m, got {self.tube}"
-            )
+        number("tube", self.tube, above=2.0 * self.tca.outer_radius, unit="m, the TCA's width")
 
     @property
     def embedded(self) -> TcaSpec:
@@ -94,10 +89,5 @@ def twisting_module(spec: TwistingSpec | None = None) -> Part:
         ValueError: If the geometry cannot be built, for example with too few nodes per turn.
     """
     spec = spec or TwistingSpec()
-    mjspec = new_spec("twisting")
-    chain = beam(mjspec.worldbody, spec.body, nodes=spec.nodes, name="body")
-    chain.tip.add_site(name="tip", pos=[0.0, 0.0, chain.local(spec.nodes)], group=4)
-    length = sum(leg_length(leg, spec.length) for leg in spec.route.legs)
-    tca = spec.embedded.of_length(length)
-    routed = route_tca(mjspec, tca, route_passes(chain, spec.route), name="tca")
-    return Part(mjspec, (routed,), {"tip": "tip"})
+    routes = {"tca": spec.route}
+    return straight_module("twisting", spec.body, spec.nodes, spec.embedded, routes)

@@ -3,14 +3,13 @@
 The arm hangs from a base that moves only up and down.
 """
 
-import math
 from dataclasses import dataclass, field
 
 import mujoco
-import numpy as np
 
-from tca_mj.checks import require_positive
+from tca_mj.checks import number, require_positive, within
 from tca_mj.model.part import Part, new_spec
+from tca_mj.model.surface import TOUCHES_NOTHING
 from tca_mj.modules.bending import BendingSpec, bending_module
 from tca_mj.modules.finger import FingerPairSpec, finger_pair
 from tca_mj.modules.twisting import TwistingSpec, twisting_module
@@ -48,11 +47,10 @@ class ArmSpec:
         require_positive(
             connector=self.connector, connector_mass=self.connector_mass, speed=self.speed
         )
-        if np.shape(self.travel) != (2,) or not 0.0 < self.travel[0] < self.travel[1] < math.inf:
-            raise ValueError(f"travel must be two heights, 0 < low < high, got {self.travel}")
-        low, high = self.travel
-        if not low <= self.height <= high:
-            raise ValueError(f"height must be within travel {self.travel}, got {self.height}")
+        low, high = within("travel", self.travel, shape=(2,), above=0.0, unit="m")
+        if not low < high:
+            raise ValueError(f"travel must be a low and a higher height, got {self.travel}")
+        number("height", self.height, at_least=low, at_most=high, unit="m, of travel")
 
 
 _DOWN = (0.0, 1.0, 0.0, 0.0)  # z to -z, half a turn about x
@@ -76,23 +74,13 @@ def arm(spec: ArmSpec | None = None) -> Part:
     mjspec = new_spec("arm")
     base = mjspec.worldbody.add_body(name="base")
     base.add_joint(
-        name="lift",
-        type=mujoco.mjtJoint.mjJNT_SLIDE,
-        axis=[0.0, 0.0, 1.0],
-        ref=0.0,
-        range=list(spec.travel),
-        limited=True,
-    )
+        name="lift", type=mujoco.mjtJoint.mjJNT_SLIDE, axis=[0.0, 0.0, 1.0], ref=0.0,
+        range=list(spec.travel), limited=True,
+    )  # fmt: skip
     base.add_geom(
-        name="carriage",
-        type=mujoco.mjtGeom.mjGEOM_BOX,
-        size=[14e-3, 14e-3, 4e-3],
-        pos=[0.0, 0.0, 4e-3],
-        mass=0.1,
-        rgba=[0.25, 0.27, 0.3, 1.0],
-        contype=0,
-        conaffinity=0,
-    )
+        name="carriage", type=mujoco.mjtGeom.mjGEOM_BOX, size=[14e-3, 14e-3, 4e-3],
+        pos=[0.0, 0.0, 4e-3], rgba=[0.25, 0.27, 0.3, 1.0], **TOUCHES_NOTHING | {"mass": 0.1},
+    )  # fmt: skip
     base.add_site(name="mount", quat=list(_DOWN), group=4)
     lift = mjspec.add_actuator(name="lift", trntype=mujoco.mjtTrn.mjTRN_JOINT, target="lift")
     lift.set_to_intvelocity(kp=2000.0, dampratio=1.0)
@@ -114,13 +102,8 @@ def _connector(part: Part, site: str, spec: ArmSpec, radius: float) -> None:
     near = part.spec.site(site)
     z = float(near.pos[2])
     near.parent.add_geom(
-        name=f"{site}.connector",
-        type=mujoco.mjtGeom.mjGEOM_CYLINDER,
-        size=[radius, spec.connector / 2.0, 0.0],
-        pos=[0.0, 0.0, z + spec.connector / 2.0],
-        mass=spec.connector_mass,
-        rgba=[0.3, 0.32, 0.36, 1.0],
-        contype=0,
-        conaffinity=1,
-    )
+        name=f"{site}.connector", type=mujoco.mjtGeom.mjGEOM_CYLINDER,
+        size=[radius, spec.connector / 2.0, 0.0], pos=[0.0, 0.0, z + spec.connector / 2.0],
+        mass=spec.connector_mass, rgba=[0.3, 0.32, 0.36, 1.0], contype=0, conaffinity=1,
+    )  # fmt: skip
     near.parent.add_site(name=f"{site}.far", pos=[0.0, 0.0, z + spec.connector], group=4)

@@ -15,14 +15,15 @@ from typing import Any
 
 import mujoco
 
-from tca_mj.checks import require_count, require_positive
-from tca_mj.model.chain import Chain, Motion, beam
+from tca_mj.checks import number, require_count, require_positive
+from tca_mj.model.chain import Chain, Motion, add_chain
 from tca_mj.model.part import Part, new_spec
-from tca_mj.model.spine import lumped_torsion, route_spine
-from tca_mj.model.tendon import Pass, RoutedTca, route_tca
-from tca_mj.modules.leg import LegSpec, continuum_leg
+from tca_mj.model.spine import lumped_torsion, route_spine, sheath
+from tca_mj.model.surface import TOUCHES_NOTHING, surface
+from tca_mj.model.tendon import Pass, RoutedTca, lay_tca
+from tca_mj.modules.continuum_leg import LegSpec, continuum_leg
 from tca_mj.rod.beam import BeamSpec, Outline
-from tca_mj.routes import Helix, leg_length
+from tca_mj.routes import Helix
 from tca_mj.smp import HeaterSpec, SpineSpec
 from tca_mj.smp.lumped import in_tube
 from tca_mj.tca import CATALOGUE, TcaSpec
@@ -86,8 +87,7 @@ class TetrapodSpec:
             )}
         )  # fmt: skip
         require_count(nodes=self.nodes)
-        if not -math.pi < self.memory_angle < math.pi:
-            raise ValueError(f"memory_angle must be within -pi and pi, got {self.memory_angle}")
+        number("memory_angle", self.memory_angle, above=-math.pi, below=math.pi, unit="rad")
 
     @property
     def places(self) -> tuple[float, ...]:
@@ -102,18 +102,13 @@ class TetrapodSpec:
             length: Length of the beam [m].
             curves: -1 if the beam of the memorised shape bends towards its y axis, else 1.
         """
-        soft = _SHEATH * count * self.spine.smp.rubbery * self.spine.second_moment
         half_width = self.spine.width / 2.0 if count == 1 else self.spacing + self.spine.width
-        return BeamSpec(
-            length=length,
-            bending=(soft, soft),
-            torsion=soft,
-            stretching=soft / self.spine.thickness**2,
-            shearing=soft / self.spine.thickness**2,
+        return sheath(
+            self.spine, _SHEATH * count, length=length,
             line_density=count * self.module_mass / self.spine.length,
             outline=Outline(half_width, self.spine.module_height, round=False),
             curvature=(curves * self.memory_angle / self.spine.length, 0.0, 0.0),
-        )
+        )  # fmt: skip
 
 
 def tetrapod(spec: TetrapodSpec | None = None) -> Part:
@@ -184,13 +179,13 @@ def _draw(mjspec: mujoco.MjSpec, tca: RoutedTca, halves: Mapping[str, Chain]) ->
     mjspec.delete(mjspec.actuator(tca.name))
     mjspec.delete(tendon)
     for chain in halves.values():
-        for number, piece in enumerate(chain.pieces):
-            end = chain.piece * (0.5 if number in (0, chain.nodes) else 1.0)
+        for index, piece in enumerate(chain.pieces):
+            end = chain.extent(index)
             for site in [site for site in piece.sites if site.name.startswith(f"{tca.name}.")]:
                 x, y, _ = site.pos
                 piece.add_geom(
                     type=mujoco.mjtGeom.mjGEOM_CYLINDER, fromto=[x, y, 0.0, x, y, end],
-                    size=[width, 0.0, 0.0], contype=0, conaffinity=0, mass=0.0, rgba=colour,
+                    size=[width, 0.0, 0.0], rgba=colour, **TOUCHES_NOTHING,
                 )  # fmt: skip
                 mjspec.delete(site)
 
@@ -234,31 +229,18 @@ def trunk(
     hub.add_freejoint(name="root")
     halves = {}
     for side, sign in SIDES.items():
-        halves[side] = _half(hub, spec, side, count=count, nodes=nodes, motions=motions)
-        add_rail(halves[side], spec, sign)
-    dress_halves(halves, spec, places if count == SPINES else {SPINES // 2: 0.0})
+        # The chain's x axis points forward; its y axis down in the left half, up in the right.
+        body = spec.body(count=count, length=spec.spine.length / 2.0, curves=-sign)
+        halves[side] = chain = add_chain(
+            hub, body, nodes=nodes, name=side, motions=motions, rgba=(0.0, 0.0, 0.0, 0.0),
+            quat=(math.sqrt(0.5), -sign * math.sqrt(0.5), 0.0, 0.0), collide=False,
+        )  # fmt: skip
+        add_rail(chain, spec, sign)
+        # What the halves have in common, on the hub, is one thing to touch.
+        common = chain.piece / 2.0 * sign
+        seen = places if count == SPINES else {SPINES // 2: 0.0}
+        dress(chain, spec, down=sign, places=seen, behind=common)
     return part, halves
-
-
-def _half(
-    hub: mujoco.MjsBody,
-    spec: TetrapodSpec,
-    side: str,
-    *,
-    count: int,
-    nodes: int,
-    motions: Sequence[Motion],
-) -> Chain:
-    """Half of ``count`` spines as one chain, from the hub to the rail of ``side``.
-
-    The chain's x axis points forward; its y axis points down in the left half, up in the right.
-    """
-    sign = SIDES[side]
-    return beam(
-        hub, spec.body(count=count, length=spec.spine.length / 2.0, curves=-sign), nodes=nodes,
-        name=side, motions=motions, quat=(math.sqrt(0.5), -sign * math.sqrt(0.5), 0.0, 0.0),
-        rgba=(0.0, 0.0, 0.0, 0.0), collide=False,
-    )  # fmt: skip
 
 
 def attach_legs(part: Part, leg: LegSpec) -> None:
@@ -269,15 +251,6 @@ def attach_legs(part: Part, leg: LegSpec) -> None:
             part.attach(child, to=f"{side}.{place}", prefix=f"{place}_{side}")
     order = {name: i for i, name in enumerate(LEGS)}
     part.tcas = tuple(sorted(part.tcas, key=lambda tca: order[tca.name.split(".")[0]]))
-
-
-def dress_halves(
-    halves: Mapping[str, Chain], spec: TetrapodSpec, places: Mapping[int, float]
-) -> None:
-    """``dress`` for both halves. What they have in common, on the hub, is one thing to touch."""
-    for side, sign in SIDES.items():
-        common = halves[side].piece / 2.0 * sign
-        dress(halves[side], spec, down=sign, places=places, behind=common)
 
 
 def dress(
@@ -299,34 +272,29 @@ def dress(
             it out [m].
     """
     size, tube = spec.spine, spec.spine.module_height - spec.spine.thickness
-    for number, piece in enumerate(chain.pieces):
-        end = chain.piece * (0.5 if number in (0, chain.nodes) else 1.0)
-        begin = 0.0 if number else -behind
+    for index, piece in enumerate(chain.pieces):
+        end = chain.extent(index)
+        begin = 0.0 if index else -behind
         half, middle = (end - begin) / 2.0, (end + begin) / 2.0
         if half <= 0.0:
             continue
         for i, x in places.items():
             piece.add_geom(
-                name=f"{chain.name}.spine{i}.{number}", type=mujoco.mjtGeom.mjGEOM_BOX,
-                pos=[x, 0.0, middle],
-                size=[size.width / 2.0, size.thickness / 2.0, half],
-                mass=0.0, rgba=[0.86, 0.78, 0.52, 1.0], **_touching(spec.belly_friction),
+                name=f"{chain.name}.spine{i}.{index}", type=mujoco.mjtGeom.mjGEOM_BOX,
+                pos=[x, 0.0, middle], size=[size.width / 2.0, size.thickness / 2.0, half],
+                rgba=[0.86, 0.78, 0.52, 1.0], **_belly(spec),
             )  # fmt: skip
             piece.add_geom(
-                name=f"{chain.name}.tube{i}.{number}", type=mujoco.mjtGeom.mjGEOM_BOX,
-                pos=[x, down * spec.spine.module_height / 2.0, middle],
+                name=f"{chain.name}.tube{i}.{index}", type=mujoco.mjtGeom.mjGEOM_BOX,
+                pos=[x, down * size.module_height / 2.0, middle],
                 size=[size.width / 2.0, tube / 2.0, half],
-                mass=0.0, rgba=[0.9, 0.9, 0.88, 0.6], **_touching(spec.belly_friction),
+                rgba=[0.9, 0.9, 0.88, 0.6], **_belly(spec),
             )  # fmt: skip
 
 
-def _touching(friction: float) -> dict[str, Any]:
-    """Surface of what touches ground and obstacles, but nothing of the robot."""
-    return {
-        "contype": 0, "conaffinity": 1, "condim": 3, "priority": 1,
-        "friction": [friction, 0.002, 1e-4], "solref": [5e-3, 1.0],
-        "solimp": [0.95, 0.99, 5e-4, 0.5, 2.0],
-    }  # fmt: skip
+def _belly(spec: TetrapodSpec, mass: float = 0.0) -> dict[str, Any]:
+    """Mass and surface of what the robot may lie on."""
+    return surface((spec.belly_friction, 0.002, 1e-4), priority=1, mass=mass)
 
 
 def add_rail(chain: Chain, spec: TetrapodSpec, sign: float) -> None:
@@ -343,7 +311,7 @@ def add_rail(chain: Chain, spec: TetrapodSpec, sign: float) -> None:
     tip.add_geom(
         name=f"{chain.name}.rail", type=mujoco.mjtGeom.mjGEOM_BOX, pos=[0.0, low, middle],
         size=[spec.rail_length / 2.0, height / 2.0, spec.rail_width / 2.0],
-        mass=spec.rail_mass, rgba=grey, **_touching(spec.belly_friction),
+        rgba=grey, **_belly(spec, spec.rail_mass),
     )  # fmt: skip
     # The leg's z axis points outwards, x up.
     turn = -sign * math.pi / 4.0
@@ -352,7 +320,7 @@ def add_rail(chain: Chain, spec: TetrapodSpec, sign: float) -> None:
             name=f"{chain.name}.{place}.socket", type=mujoco.mjtGeom.mjGEOM_BOX,
             pos=[x, up * spec.leg_height / 2.0, middle],
             size=[4e-3, (spec.leg_height + height) / 2.0, spec.rail_width / 2.0],
-            contype=0, conaffinity=0, mass=0.0, rgba=grey,
+            rgba=grey, **TOUCHES_NOTHING,
         )  # fmt: skip
         tip.add_site(
             name=f"{chain.name}.{place}", group=4,
@@ -372,10 +340,4 @@ def route_spine_tca(
             below = SIDES[side] * spec.spine.tca_offset
             leg = Helix(math.hypot(place, below), phase=math.atan2(below, place))
             passes.append(Pass(halves[side], leg, down=side == sides[0]))
-    return route_tca(mjspec, sheathed(spec, passes), passes, name=name)
-
-
-def sheathed(spec: TetrapodSpec, passes: Sequence[Pass]) -> TcaSpec:
-    """The TCA that follows passes, in its tube."""
-    length = sum(leg_length(p.leg, p.chain.beam.length, p.chain.beam.curvature) for p in passes)
-    return in_tube(spec.tca).of_length(length)
+    return lay_tca(mjspec, in_tube(spec.tca), passes, name=name)

@@ -11,19 +11,13 @@ from dataclasses import replace
 import mujoco
 import numpy as np
 
-from tca_mj.model.chain import MOTIONS, Chain, Motion, beam
+from tca_mj.model.chain import MOTIONS, Chain, Motion, add_chain
 from tca_mj.model.part import Part
 from tca_mj.model.spine import route_spine
-from tca_mj.model.tendon import route_passes, route_tca
-from tca_mj.robots.tetrapod import (
-    TetrapodSpec,
-    attach_legs,
-    dress,
-    route_spine_tca,
-    sheathed,
-    trunk,
-)
+from tca_mj.model.tendon import lay_tca, route_passes
+from tca_mj.robots.tetrapod import TetrapodSpec, attach_legs, dress, route_spine_tca, trunk
 from tca_mj.routes import UTurn
+from tca_mj.smp.lumped import in_tube
 
 _LEG_MOTIONS: tuple[Motion, ...] = ("bend_x", "bend_y", "twist")
 
@@ -60,7 +54,7 @@ def fine_tetrapod(spec: TetrapodSpec | None = None, *, nodes: int = 6, leg_nodes
             chains = [outer[i]]
             route = UTurn.parallel(spec.spine.tca_offset, spec.spine.width / 4.0, math.pi / 2.0)
             passes = route_passes(outer[i], route)
-            part.tcas += (route_tca(mjspec, sheathed(spec, passes), passes, name=name),)
+            part.tcas += (lay_tca(mjspec, in_tube(spec.tca), passes, name=name),)
         else:
             chains = list(halves.values())
             part.tcas += (route_spine_tca(mjspec, halves, spec, 0.0, name),)
@@ -74,7 +68,7 @@ def _outer(
     """The whole spine ``number``, from the right rail to a weld at the left one."""
     right, left = halves["right"], halves["left"]
     x, name = spec.places[number], f"outer{number}"
-    chain = beam(
+    chain = add_chain(
         right.tip, spec.body(count=1, length=spec.spine.length, curves=-1.0),
         nodes=2 * right.nodes, name=name, motions=MOTIONS,
         pos=(x, 0.0, right.local(right.nodes)), quat=(0.0, 1.0, 0.0, 0.0),

@@ -1,10 +1,11 @@
 """What a soft beam is made of: section, stiffness, mass and reference shape."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
-from tca_mj.checks import require_positive
+from tca_mj.checks import number, require_positive, within
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,7 +28,10 @@ class Outline:
     def __post_init__(self) -> None:
         require_positive(half_width=self.half_width, half_height=self.half_height)
         if self.round and self.half_width != self.half_height:
-            raise ValueError(f"a round outline has half_width equal to half_height, got {self}")
+            raise ValueError(
+                f"half_height must be half_width {self.half_width} m in a round outline,"
+                f" got {self.half_height}"
+            )
 
     def contains(self, x: float, y: float, tolerance: float = 1e-9) -> bool:
         """Whether the point (x, y) [m] of the section lies inside the contour."""
@@ -78,23 +82,13 @@ class BeamSpec:
     damping_time: float = 1e-2
 
     def __post_init__(self) -> None:
-        if np.shape(self.bending) != (2,):
-            raise ValueError(f"bending must be two numbers, got {self.bending}")
+        within("bending", self.bending, shape=(2,), above=0.0)
         require_positive(
-            **{
-                "length": self.length,
-                "bending[0]": self.bending[0],
-                "bending[1]": self.bending[1],
-                "torsion": self.torsion,
-                "stretching": self.stretching,
-                "shearing": self.shearing,
-                "line_density": self.line_density,
-            }
-        )
-        if not (np.isfinite(self.damping_time) and self.damping_time >= 0.0):
-            raise ValueError(f"damping_time must be at least 0 s, got {self.damping_time}")
-        if np.shape(self.curvature) != (3,) or not np.all(np.isfinite(self.curvature)):
-            raise ValueError(f"curvature must be three finite numbers, got {self.curvature}")
+            length=self.length, torsion=self.torsion, stretching=self.stretching,
+            shearing=self.shearing, line_density=self.line_density,
+        )  # fmt: skip
+        number("damping_time", self.damping_time, at_least=0.0, unit="s")
+        within("curvature", self.curvature, shape=(3,))
 
     @property
     def mass(self) -> float:
@@ -111,8 +105,7 @@ class BeamSpec:
         shear: float,
         density: float,
         outer_diameter: float | None = None,
-        curvature: tuple[float, float, float] = (0.0, 0.0, 0.0),
-        damping_time: float = 1e-2,
+        **more: Any,
     ) -> "BeamSpec":
         """A round beam.
 
@@ -123,16 +116,14 @@ class BeamSpec:
             shear: Shear modulus G [Pa].
             density: Density of the whole body [kg/m³].
             outer_diameter: Diameter of the outline, ``diameter`` by default [m].
-            curvature: Reference curvature [1/m].
-            damping_time: Kelvin-Voigt time [s].
+            **more: ``curvature`` and ``damping_time``, as in the class.
 
         Raises:
             ValueError: If a dimension or a modulus is not positive.
         """
-        require_positive(length=length, diameter=diameter, young=young, shear=shear,
-                         density=density)  # fmt: skip
         outer = diameter if outer_diameter is None else outer_diameter
-        require_positive(outer_diameter=outer)
+        require_positive(length=length, diameter=diameter, young=young, shear=shear,
+                         density=density, outer_diameter=outer)  # fmt: skip
         area = np.pi * diameter**2 / 4.0
         inertia = np.pi * diameter**4 / 64.0
         outline = Outline(outer / 2.0, outer / 2.0)
@@ -144,8 +135,7 @@ class BeamSpec:
             shearing=shear * area,
             line_density=density * outline.area,
             outline=outline,
-            curvature=curvature,
-            damping_time=damping_time,
+            **more,
         )
 
     @classmethod
@@ -158,10 +148,9 @@ class BeamSpec:
         young: float,
         shear: float,
         density: float,
-        curvature: tuple[float, float, float] = (0.0, 0.0, 0.0),
-        damping_time: float = 1e-2,
+        **more: Any,
     ) -> "BeamSpec":
-        """A beam of rectangular section, ``width`` along x and ``height`` along y.
+        """A beam of rectangular section, ``width`` along x and ``height`` along y; else as round.
 
         The torsion constant is Saint-Venant's, by its series (Timoshenko & Goodier, Theory of
         Elasticity, section 109), not the polar moment, which is too large by 1.8 for 3 x 6 mm.
@@ -180,8 +169,7 @@ class BeamSpec:
             shearing=shear * area,
             line_density=density * area,
             outline=Outline(width / 2.0, height / 2.0, round=False),
-            curvature=curvature,
-            damping_time=damping_time,
+            **more,
         )
 
 

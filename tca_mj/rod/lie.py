@@ -6,9 +6,9 @@ h' = h u/2 cannot leave SO(3) [Sun, dissertation, Colorado State University, Sec
 """
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-Array = NDArray[np.float64]
+from tca_mj.checks import Array
 
 
 def quaternion_product(left: ArrayLike, right: ArrayLike) -> Array:
@@ -154,7 +154,8 @@ def quaternion_log(quaternion: ArrayLike) -> Array:
 
 def hat(vector: ArrayLike) -> Array:
     """Matrices of the cross product: hat(a) b = a x b; shape (..., 3) -> (..., 3, 3)."""
-    x, y, z = np.moveaxis(np.asarray(vector, dtype=np.float64), -1, 0)
-    zero = np.zeros_like(x)
-    rows = ([zero, -z, y], [z, zero, -x], [-y, x, zero])
-    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+    v = np.asarray(vector, dtype=np.float64)
+    matrix = np.zeros((*v.shape, 3))
+    matrix[..., [2, 0, 1], [1, 2, 0]] = v
+    matrix[..., [1, 2, 0], [2, 0, 1]] = -v
+    return matrix

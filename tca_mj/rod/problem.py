@@ -3,17 +3,16 @@
 import math
 from collections.abc import Sequence
 from dataclasses import KW_ONLY, dataclass
-from numbers import Real
 from typing import Any, Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from tca_mj.checks import number, within
 from tca_mj.rod.beam import BeamSpec
+from tca_mj.rod.errors import RodSolveError
 from tca_mj.rod.lie import matrix_quaternion
 from tca_mj.routes import Route
-
-Array = NDArray[np.float64]
 
 _PROBES = (np.arange(512) + 0.5) / 512  # where a leg of a route is tried
 _OFF = 0.1  # part of a leg's way in the section by which its slope may miss it at the probes
@@ -69,17 +68,16 @@ class Segment:
             )
         for i, tension in enumerate(self.tensions):
             if not callable(tension):
-                _require_not_negative(f"tensions[{i}]", tension)
+                number(f"tensions[{i}]", tension, at_least=0.0, unit="N")
         for i, route in enumerate(self.routes):
             _require_legs(f"routes[{i}]", route)
-        object.__setattr__(self, "rotation", _finite("rotation", self.rotation, (3, 3)))
+        _keep(self, (3, 3), "rotation")
         matrix_quaternion(self.rotation)  # raises unless it is a rotation
-        for field in ("offset", "centre"):
-            object.__setattr__(self, field, _finite(field, getattr(self, field), (3,)))
-        _require_not_negative("mass", self.mass)
+        _keep(self, (3,), "offset", "centre")
+        number("mass", self.mass, at_least=0.0, unit="kg")
 
 
-@dataclass(frozen=True, kw_only=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False)
 class StaticProblem:
     """Segments in series, the first one clamped to the world, under dead loads.
 
@@ -105,10 +103,31 @@ class StaticProblem:
         object.__setattr__(self, "segments", _tuple("segments", self.segments))
         if not self.segments or not all(isinstance(each, Segment) for each in self.segments):
             raise ValueError(f"segments must be at least one Segment, got {self.segments!r}")
-        for field in ("tip_force", "tip_moment", "gravity"):
-            object.__setattr__(self, field, _finite(field, getattr(self, field), (3,)))
+        _keep(self, (3,), "tip_force", "tip_moment", "gravity")
         if not isinstance(self.shearable, bool | np.bool_):
             raise ValueError(f"shearable must be True or False, got {self.shearable!r}")
+
+
+def asked(strand: int, law: float | StrandLaw, length: float) -> tuple[float, float]:
+    """Tension [N] and slope [N/m] of a strand, by its number, at a length [m].
+
+    Raises:
+        ValueError: If that is not finite or pushes.
+        RodSolveError: If the law has no answer.
+    """
+    if not callable(law):
+        return float(law), 0.0
+    try:
+        answer = law(length)
+    except (ValueError, ArithmeticError) as error:
+        raise RodSolveError(
+            f"the law of strand {strand} has no answer at {length:.6g} m: {error}", math.inf
+        ) from error
+    where = f"by the law of strand {strand} at {length:.6g} m"
+    return (
+        number(f"tension {where}", answer[0], at_least=0.0, unit="N"),
+        number(f"slope {where}", answer[1], at_least=0.0, unit="N/m"),
+    )
 
 
 def _tuple(field: str, values: Any) -> tuple[Any, ...]:
@@ -118,22 +137,12 @@ def _tuple(field: str, values: Any) -> tuple[Any, ...]:
         raise ValueError(f"{field} must be a sequence, got {values!r}") from None
 
 
-def _finite(field: str, values: Any, shape: tuple[int, ...]) -> Array:
-    """A read-only copy of a field that is an array."""
-    try:
-        array = np.array(values, dtype=np.float64)
-    except (TypeError, ValueError):
-        array = np.array(math.nan)
-    if array.shape != shape or not np.isfinite(array).all():
-        size = " x ".join(str(length) for length in shape)
-        raise ValueError(f"{field} must be {size} finite numbers, got {values!r}")
-    array.flags.writeable = False
-    return array
-
-
-def _require_not_negative(field: str, value: Any) -> None:
-    if not (isinstance(value, Real) and 0.0 <= float(value) < math.inf):
-        raise ValueError(f"{field} must be finite and at least 0, got {value!r}")
+def _keep(spec: Segment | StaticProblem, shape: tuple[int, ...], *fields: str) -> None:
+    """Makes fields read-only arrays of finite numbers."""
+    for field in fields:
+        array = within(field, getattr(spec, field), shape=shape).copy()
+        array.flags.writeable = False
+        object.__setattr__(spec, field, array)
 
 
 def _require_legs(field: str, route: Any) -> None:
@@ -143,17 +152,13 @@ def _require_legs(field: str, route: Any) -> None:
     for leg in legs:
         for name in ("offset", "slope"):
             if not callable(getattr(leg, name, None)):
-                raise ValueError(f"{field}: a leg must have the method {name}(s), got {leg!r}")
-            values = np.asarray(getattr(leg, name)(_PROBES), dtype=np.float64)
-            if values.shape != (len(_PROBES), 2) or not np.isfinite(values).all():
-                raise ValueError(
-                    f"{field}: {name}(s) must give finite numbers of shape (..., 2), got {values}"
-                )
+                raise ValueError(f"legs of {field} must have the method {name}(s), got {leg!r}")
+            within(f"{name}(s) of {field}", getattr(leg, name)(_PROBES), shape=(len(_PROBES), 2))
         slope = np.asarray(leg.slope(_PROBES), dtype=np.float64)
         run = np.diff(np.asarray(leg.offset(np.array([0.0, 1.0])), dtype=np.float64), axis=0)[0]
         off = float(np.abs(slope.mean(axis=0) - run).max())
         if off > _OFF * float(np.linalg.norm(slope, axis=1).mean()) + 1e-12:
             raise ValueError(
-                f"{field}: slope(s) must be the derivative of offset(s) by s from 0 to 1; it misses"
-                f" offset(1) - offset(0) = {run} by {off:.3g} m"
+                f"slope(s) of {field} must be the derivative of offset(s) by s from 0 to 1, got one"
+                f" that misses offset(1) - offset(0) = {run} by {off:.3g} m"
             )

@@ -3,7 +3,8 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+
+from tca_mj.checks import Array
 
 
 @dataclass(frozen=True, kw_only=True, slots=True, eq=False)
@@ -24,16 +25,16 @@ class RodShape:
         base_moment: Moment that holds the base, about the origin, shape (3,) [N m].
     """
 
-    position: NDArray[np.float64]
-    rotation: NDArray[np.float64]
-    arc_length: NDArray[np.float64]
-    strain: NDArray[np.float64] | None
-    tca_length: NDArray[np.float64]
-    base_force: NDArray[np.float64]
-    base_moment: NDArray[np.float64]
+    position: Array
+    rotation: Array
+    arc_length: Array
+    strain: Array | None
+    tca_length: Array
+    base_force: Array
+    base_moment: Array
 
     @property
-    def tip(self) -> NDArray[np.float64]:
+    def tip(self) -> Array:
         """Position of the tip, shape (3,) [m]."""
         return self.position[-1]
 

@@ -2,37 +2,24 @@
 
 from collections.abc import Sequence
 from numbers import Integral
+from typing import Any
 
 from numpy.typing import ArrayLike
 
 from tca_mj.rod.beam import BeamSpec
-from tca_mj.rod.energy import minimise
+from tca_mj.rod.energy.solver import minimise
 from tca_mj.rod.problem import Segment, StaticProblem, StrandLaw
 from tca_mj.rod.shape import RodShape
-from tca_mj.rod.shooting import solve
+from tca_mj.rod.shooting.solver import solve
 from tca_mj.routes import Route
 
 SOLVERS = ("shooting", "energy")
 
 
 def solve_static(
-    beam: BeamSpec,
-    routes: Sequence[Route],
-    tensions: Sequence[float | StrandLaw],
-    *,
-    tip_force: ArrayLike = (0.0, 0.0, 0.0),
-    tip_moment: ArrayLike = (0.0, 0.0, 0.0),
-    gravity: ArrayLike = (0.0, 0.0, 0.0),
-    solver: str = "shooting",
-    shearable: bool = True,
-    points: int = 65,
+    beam: BeamSpec, routes: Sequence[Route], tensions: Sequence[float | StrandLaw], **options: Any
 ) -> RodShape:
     """Static shape of a clamped soft body with strands on arbitrary routes, by rod theory.
-
-    The exact theory of a Cosserat rod (bending, twist, shear and stretch of any size, linear
-    elastic in them), whose strands slide without friction on their routes and are fixed at the
-    base and the tip. Loads are dead: they keep their direction. The state is the one
-    that continues the unloaded body when loads and tensions grow together.
 
     Args:
         beam: The body, its base at the origin, along +z.
@@ -40,34 +27,17 @@ def solve_static(
             ``routes.Route`` tells of. They may lie outside the body.
         tensions: For each strand its tension, at least 0 [N], or its law, for a TCA at a
             temperature: from the length of its route to tension and slope.
-        tip_force: Force on the tip, world frame, shape (3,) [N].
-        tip_moment: Moment on the tip, world frame, shape (3,) [N m].
-        gravity: Acceleration of gravity, world frame, shape (3,) [m/s²].
-        solver: "shooting", on the balance of sections, or "energy", the minimum of the total
-            energy over the motions of the sections. They share the section's energy, no more.
-        shearable: Whether sections shear. Without, the rod still stretches: what a chain of
-            hinges and slides is.
-        points: Number of points of the answer, at equal distances, at least 2. It has no
-            influence on accuracy.
+        **options: ``tip_force``, ``tip_moment``, ``gravity``, ``solver``, ``shearable`` and
+            ``points``, as in ``solve_series``.
 
     Returns:
         The shape at the points from base to tip, the strands' lengths, and what holds the base:
         nothing if only strands pull, because they pull between two sections of one body.
 
     Raises:
-        ValueError: If an argument has a wrong shape, is not finite, or a tension is negative.
-        RodSolveError: If no state is found, with what is left of the equations.
+        ValueError, RodSolveError: As in ``solve_series``.
     """
-    segment = Segment(beam, routes, tensions)
-    return solve_series(
-        [segment],
-        tip_force=tip_force,
-        tip_moment=tip_moment,
-        gravity=gravity,
-        solver=solver,
-        shearable=shearable,
-        points=points,
-    )[0]
+    return solve_series([Segment(beam, routes, tensions)], **options)[0]
 
 
 def solve_series(
@@ -82,14 +52,22 @@ def solve_series(
 ) -> tuple[RodShape, ...]:
     """Static shapes of soft bodies in series, each on the tip of the one before.
 
+    The exact theory of a Cosserat rod (bending, twist, shear and stretch of any size, linear
+    elastic in them), whose strands slide without friction on their routes and are fixed at the
+    base and the tip. Loads are dead: they keep their direction. The state is the one
+    that continues the unloaded bodies when loads and tensions grow together.
+
     Args:
         segments: The bodies from base to tip, with what is rigid between them.
         tip_force: Force on the last tip, world frame, shape (3,) [N].
         tip_moment: Moment on it, world frame, shape (3,) [N m].
         gravity: Acceleration of gravity, world frame, shape (3,) [m/s²].
-        solver: As in ``solve_static``.
-        shearable: As in ``solve_static``.
-        points: Number of points of each segment, at least 2.
+        solver: "shooting", on the balance of sections, or "energy", the minimum of the total
+            energy over the motions of the sections. They share the section's energy, no more.
+        shearable: Whether sections shear. Without, the rod still stretches: what a chain of
+            hinges and slides is.
+        points: Number of points of each segment, at equal distances, at least 2. It has no
+            influence on accuracy.
 
     Returns:
         One shape per segment, all in the world's frame. ``base_force`` and ``base_moment`` are
@@ -103,13 +81,5 @@ def solve_series(
         raise ValueError(f"solver must be one of {SOLVERS}, got {solver!r}")
     if not isinstance(points, Integral) or points < 2:
         raise ValueError(f"points must be a whole number of at least 2, got {points!r}")
-    problem = StaticProblem(
-        segments=segments,
-        tip_force=tip_force,
-        tip_moment=tip_moment,
-        gravity=gravity,
-        shearable=shearable,
-    )
-    if solver == "energy":
-        return tuple(minimise(problem, points=int(points)))
-    return tuple(solve(problem, int(points)))
+    problem = StaticProblem(segments, tip_force, tip_moment, gravity, shearable)
+    return (minimise if solver == "energy" else solve)(problem, int(points))

@@ -1,16 +1,16 @@
 """Several spines advanced together, with all joints that they stiffen."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from tca_mj.checks import floats
 from tca_mj.smp.fixing import SpineState, Spring, advance, spring
 from tca_mj.smp.heater import HeaterSpec, HeaterState, heat_spine
 from tca_mj.smp.material import SmpSpec, SpineSpec
-
-Array = NDArray[np.float64]
+from tca_mj.tca.arrays import column
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -54,12 +54,8 @@ class SpineBank:
         if self.owner.ndim != 1 or not ((self.owner >= 0) & (self.owner < len(specs))).all():
             raise ValueError(f"owner must be indices below {len(specs)}, got {owner!r}")
         self.smp: SmpSpec = specs[0].smp
-        self.heater = HeaterSpec(
-            **{
-                field: np.array([getattr(heater, field) for heater in heaters])
-                for field in ("capacity", "loss", "fan_gain", "resistance", "ambient")
-            }
-        )
+        names = [field.name for field in fields(HeaterSpec)]
+        self.heater = HeaterSpec(**{name: column(heaters, name) for name in names})
 
     @property
     def n(self) -> int:
@@ -74,12 +70,12 @@ class SpineBank:
             shape: Angles in which they were fixed, the same shape; by default the memorised ones.
                 Between the two only the rubber pulls, as after an ideal fixing [rad].
         """
-        memory = np.asarray(memory, dtype=np.float64)
+        memory = floats("memory", memory)
         heat = HeaterState.rest(self.heater, (*memory.shape[:-1], self.n))
         state = SpineState.rest(self.smp, memory, heat.temperature[..., self.owner])
         if shape is not None:
             # The glass is strained so far that it holds the rubber in the shape.
-            shape = np.asarray(shape, dtype=np.float64)
+            shape = floats("shape", shape)
             frozen = shape + self.smp.rubbery / state.glass * (shape - memory)
             state = SpineState(state.memory, frozen, state.glass)
         return SpinesState(heat, state)

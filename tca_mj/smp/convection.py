@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from scipy.optimize import brentq
 
-from tca_mj.checks import require_positive
+from tca_mj.checks import number, require_positive
 
 _ZERO = 273.15  # 0 °C [K]
 _STEFAN_BOLTZMANN = 5.670374e-8  # [W/(m² K⁴)]
@@ -26,8 +26,7 @@ class Air:
     temperature: float
 
     def __post_init__(self) -> None:
-        if not -100.0 <= self.temperature <= 600.0:
-            raise ValueError(f"temperature = {self.temperature} must be from -100 to 600 °C")
+        number("temperature", self.temperature, at_least=-100.0, at_most=600.0, unit="°C")
 
     @property
     def expansion(self) -> float:
@@ -168,8 +167,7 @@ class Slab:
         Raises:
             ValueError: If the ratio is smaller.
         """
-        if not excess_ratio >= 1.2:
-            raise ValueError(f"excess_ratio = {excess_ratio} must be at least 1.2")
+        number("excess_ratio", excess_ratio, at_least=1.2)
         z = self.root
         amplitude = 4.0 * math.sin(z) / (2.0 * z + math.sin(2.0 * z))
         return self.time_constant * math.log(amplitude * excess_ratio)

@@ -12,9 +12,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from tca_mj.checks import Array, floats, number, require_positive, within
 from tca_mj.smp.material import SOFT_MODULUS, SmpSpec, SpineSpec
 
-Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 # A bending module is steady when it turns less than this, Sun, Section 6.2.1 [rad/s].
@@ -45,15 +45,10 @@ class DamageSpec:
     slack: float = 1e-3
 
     def __post_init__(self) -> None:
-        for name in ("soft_modulus", "rigid_modulus", "steady_rate", "slack"):
-            value = getattr(self, name)
-            if not 0.0 < value < math.inf:
-                raise ValueError(f"{name} = {value} must be finite and above 0")
-        if not self.soft_modulus < self.rigid_modulus:
-            raise ValueError(
-                f"soft_modulus = {self.soft_modulus} must be below rigid_modulus ="
-                f" {self.rigid_modulus}"
-            )
+        require_positive(
+            rigid_modulus=self.rigid_modulus, steady_rate=self.steady_rate, slack=self.slack
+        )
+        number("soft_modulus", self.soft_modulus, above=0.0, below=self.rigid_modulus, unit="Pa")
 
     @classmethod
     def of(cls, smp: SmpSpec) -> "DamageSpec":
@@ -87,7 +82,7 @@ def soft_bending_rate(spine: SpineSpec, tension_rate: ArrayLike) -> Array:
     """
     stiffness = spine.smp.rubbery * spine.second_moment
     lever = 2.0 * spine.tca_offset * spine.length / stiffness
-    return lever * np.asarray(tension_rate, dtype=np.float64)
+    return lever * floats("tension_rate", tension_rate)
 
 
 def flag_damage(
@@ -117,15 +112,10 @@ def flag_damage(
         ValueError: If a number is not finite.
     """
     spec = spec or DamageSpec()
-    values = {"modulus": modulus, "tension": tension, "bending_rate": bending_rate}
-    checked = {name: np.asarray(value, dtype=np.float64) for name, value in values.items()}
-    for name, value in checked.items():
-        if not np.isfinite(value).all():
-            raise ValueError(f"{name} = {value} must be finite")
-    rate = checked["bending_rate"]
-    stiff = checked["modulus"] > spec.soft_modulus
-    hardening = stiff & (checked["modulus"] < spec.rigid_modulus) & np.asarray(cooling, dtype=bool)
-    taut = checked["tension"] > spec.slack
+    modulus, rate = within("modulus", modulus), within("bending_rate", bending_rate)
+    stiff = modulus > spec.soft_modulus
+    hardening = stiff & (modulus < spec.rigid_modulus) & np.asarray(cooling, dtype=bool)
+    taut = within("tension", tension) > spec.slack
     return Damage(
         damaged=stiff & taut & (rate > spec.steady_rate),
         inaccurate=hardening & taut & (rate < -spec.steady_rate),

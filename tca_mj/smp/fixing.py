@@ -25,11 +25,10 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from tca_mj.checks import Array, within
 from tca_mj.smp.material import SmpSpec
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -53,7 +52,7 @@ class SpineState:
         Raises:
             ValueError: If a number is not finite.
         """
-        memory = _finite("memory", memory)
+        memory = within("memory", memory)
         glass = np.broadcast_arrays(smp.glass(temperature), memory)[0].copy()
         return cls(memory + np.zeros_like(glass), memory + np.zeros_like(glass), glass)
 
@@ -90,7 +89,7 @@ def advance(
     Raises:
         ValueError: If a number is not finite.
     """
-    angle = _finite("angle", angle)
+    angle = within("angle", angle)
     glass = smp.glass(temperature) + np.zeros_like(state.glass)
     grown = np.maximum(glass - state.glass, 0.0)
     # Share of new glass in all of it; without any glass there is nothing to move.
@@ -119,7 +118,7 @@ def stored_energy(smp: SmpSpec, state: SpineState, angle: ArrayLike) -> Array:
     Raises:
         ValueError: If an angle is not finite.
     """
-    angle = _finite("angle", angle)
+    angle = within("angle", angle)
     soft, hard = angle - state.memory, angle - state.frozen
     return 0.5 * (smp.rubbery * soft * soft + state.glass * hard * hard)
 
@@ -143,10 +142,3 @@ def recovery(smp: SmpSpec, hot: ArrayLike) -> Array:
         hot: Temperature to which it is heated [°C].
     """
     return smp.rubbery / smp.modulus(hot)
-
-
-def _finite(name: str, values: ArrayLike) -> Array:
-    values = np.asarray(values, dtype=np.float64)
-    if not np.isfinite(values).all():
-        raise ValueError(f"{name} = {values} must be finite")
-    return values

@@ -13,16 +13,14 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from tca_mj.checks import require_positive
+from tca_mj.checks import Array, floats, number, require_positive, within
 from tca_mj.smp.convection import Slab, moving_air, radiation, still_air
 from tca_mj.smp.material import SpineSpec
-from tca_mj.tca import HeatSpec, heat_lost, power_from_voltage, step_temperature
+from tca_mj.tca import HeatSpec, power_from_voltage
+from tca_mj.tca.thermal import bare_step
 
-Array = NDArray[np.float64]
-
-HEAT_VOLTAGE = 25.0  # Sun, Section 6.1.3 [V]
 HOLD_VOLTAGE = 9.5  # Sun, Section 6.1.3 [V]
 COOL_TO = 80.0  # temperature at which both cooling times end, Sun, Section 6.1.3 [°C]
 COOL_TIME = 25.0  # time to cool in still air, Sun, Section 6.1.3; fitted [s]
@@ -55,11 +53,8 @@ class HeaterSpec:
 
     def __post_init__(self) -> None:
         HeatSpec(capacity=self.capacity, loss=self.loss, ambient=self.ambient)
-        for name, low in (("fan_gain", 1.0), ("resistance", 0.0)):
-            value = np.asarray(getattr(self, name))
-            if not (np.isfinite(value) & (value >= low) & (value > 0.0)).all():
-                bound = "at least 1" if low else "above 0"
-                raise ValueError(f"{name} = {value} must be finite and {bound}")
+        within("fan_gain", self.fan_gain, at_least=1.0)
+        within("resistance", self.resistance, above=0.0, unit="ohm")
 
     @classmethod
     def fitted(
@@ -88,11 +83,8 @@ class HeaterSpec:
             ValueError: If a number is out of range.
         """
         require_positive(hold_voltage=hold_voltage, cool_time=cool_time, fan_speed=fan_speed)
-        if not ambient < COOL_TO < hold_temperature:
-            raise ValueError(
-                f"hold_temperature = {hold_temperature} must be above {COOL_TO} °C and that above"
-                f" ambient = {ambient}"
-            )
+        number("hold_temperature", hold_temperature, above=COOL_TO, unit="°C")
+        number("ambient", ambient, below=COOL_TO, unit="°C")
         excess = hold_temperature - ambient
         loss = spine.heat_capacity * math.log(excess / (COOL_TO - ambient)) / cool_time
         return cls(
@@ -105,8 +97,11 @@ class HeaterSpec:
 
     def heat(self, fan: ArrayLike = False) -> HeatSpec:
         """The heat balance with the fan on or off, shape (..., n)."""
-        loss = np.where(np.asarray(fan, dtype=bool), self.loss * self.fan_gain, self.loss)
-        return HeatSpec(capacity=self.capacity, loss=loss, ambient=self.ambient)
+        return HeatSpec(capacity=self.capacity, loss=self.losing(fan), ambient=self.ambient)
+
+    def losing(self, fan: ArrayLike) -> Array:
+        """Heat lost per excess temperature with the fan on or off, shape (..., n) [W/K]."""
+        return np.where(np.asarray(fan, dtype=bool), self.loss * self.fan_gain, self.loss)
 
     def power(self, voltage: ArrayLike) -> Array:
         """Power V²/R of the heater, shape (..., n) [W]."""
@@ -128,8 +123,8 @@ class HeaterSpec:
             fan: Whether the fan blows, same shape.
         """
         settled, tau = self.settled(voltage, fan), np.asarray(self.heat(fan).time_constant)
-        now = np.asarray(start, dtype=np.float64) - settled
-        now, then = np.broadcast_arrays(now, np.asarray(target, dtype=np.float64) - settled)
+        now = floats("start", start) - settled
+        now, then = np.broadcast_arrays(now, floats("target", target) - settled)
         # From here the spine goes straight towards what the voltage holds, and never past it.
         ratio = np.divide(now, then, out=np.where(now == 0.0, 1.0, 0.0), where=then != 0.0)
         return np.where(ratio >= 1.0, tau * np.log(np.maximum(ratio, 1.0)), np.inf)
@@ -152,7 +147,7 @@ class HeaterState:
     @classmethod
     def rest(cls, spec: HeaterSpec, shape: tuple[int, ...] = ()) -> "HeaterState":
         """At the temperature of the surroundings, no energy counted."""
-        temperature = np.broadcast_to(np.asarray(spec.ambient, dtype=np.float64), shape).copy()
+        temperature = np.broadcast_to(spec.ambient, shape).copy()
         return cls(temperature, np.zeros(shape), np.zeros(shape))
 
 
@@ -171,12 +166,12 @@ def heat_spine(
     Raises:
         ValueError: If a voltage is not finite, or ``dt`` negative.
     """
-    power, heat = spec.power(voltage), spec.heat(fan)
-    return HeaterState(
-        temperature=step_temperature(state.temperature, power, heat, dt),
-        energy_in=state.energy_in + power * dt,
-        energy_lost=state.energy_lost + heat_lost(state.temperature, power, heat, dt),
+    power, loss = spec.power(voltage), spec.losing(fan)
+    number("dt", dt, at_least=0.0, unit="s")
+    temperature, lost = bare_step(
+        state.temperature, power, spec.capacity, loss, spec.ambient, dt
     )
+    return HeaterState(temperature, state.energy_in + power * dt, state.energy_lost + lost)
 
 
 def fan_gain(spine: SpineSpec, speed: float, start: float, ambient: float) -> float:

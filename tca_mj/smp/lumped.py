@@ -8,16 +8,14 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tca_mj.checks import Array
 from tca_mj.smp.damage import Damage, DamageSpec, flag_damage, soft_bending_rate
 from tca_mj.smp.fixing import SpineState, advance, spring
 from tca_mj.smp.heater import HeaterSpec, HeaterState, heat_spine
 from tca_mj.smp.material import SpineSpec
 from tca_mj.tca import Pull, TcaBank, TcaSpec, TcaState
 from tca_mj.tca.embedding import silicone_body
-
-Array = NDArray[np.float64]
 
 # Outer diameter of the silicone tube round the TCA: an estimate, half the module's 5 mm [m].
 TUBE_DIAMETER = 2.5e-3

@@ -4,12 +4,10 @@ import math
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.special import expit
 
-from tca_mj.checks import require_positive
-
-Array = NDArray[np.float64]
+from tca_mj.checks import Array, number, require_positive, within
 
 # Above 110 °C the modulus is below this, Sun, dissertation, Colorado State University, 6.1.3 [Pa].
 SOFT_MODULUS = 50e6
@@ -53,19 +51,11 @@ class SmpSpec:
             glassy=self.glassy, rubbery=self.rubbery, density=self.density,
             specific_heat=self.specific_heat, conductivity=self.conductivity,
         )  # fmt: skip
-        if not self.rubbery < self.glassy:
-            raise ValueError(f"rubbery = {self.rubbery} must be below glassy = {self.glassy}")
-        if not -273.15 < self.rigid_below < self.soft_above < math.inf:
-            raise ValueError(
-                f"rigid_below = {self.rigid_below} must be above -273.15 °C and below"
-                f" soft_above = {self.soft_above}"
-            )
-        half = math.sqrt(self.rubbery / self.glassy)
-        if not half < self.rigid_share < 1.0:
-            raise ValueError(
-                f"rigid_share = {self.rigid_share} must be above {half:.3g}, which is left at the"
-                " middle of the transition, and below 1"
-            )
+        number("rubbery", self.rubbery, below=self.glassy, unit="Pa")
+        number("soft_above", self.soft_above, unit="°C")
+        number("rigid_below", self.rigid_below, above=-273.15, below=self.soft_above, unit="°C")
+        half = math.sqrt(self.rubbery / self.glassy)  # what is left at the middle
+        number("rigid_share", self.rigid_share, above=half, below=1.0)
 
     @property
     def middle(self) -> float:
@@ -105,9 +95,7 @@ class SmpSpec:
 
     def _decades(self, temperature: ArrayLike) -> tuple[Array, Array]:
         """ln(E/rubbery) and the sigmoid, 1 when cold and 0 when hot."""
-        temperature = np.asarray(temperature, dtype=np.float64)
-        if not np.isfinite(temperature).all():
-            raise ValueError(f"temperature = {temperature} °C must be finite")
+        temperature = within("temperature", temperature)
         share = expit((self.middle - temperature) / self.width)
         return math.log(self.glassy / self.rubbery) * share, share
 
@@ -146,10 +134,7 @@ class SpineSpec:
             length=self.length, width=self.width, thickness=self.thickness,
             module_height=self.module_height, tca_offset=self.tca_offset,
         )  # fmt: skip
-        if not self.thickness <= self.module_height:
-            raise ValueError(
-                f"thickness = {self.thickness} must be at most module_height = {self.module_height}"
-            )
+        number("thickness", self.thickness, at_most=self.module_height, unit="m")
 
     @property
     def second_moment(self) -> float:

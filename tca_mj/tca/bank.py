@@ -2,19 +2,31 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tca_mj.checks import floats
-from tca_mj.tca.coilrod import CoilRods
-from tca_mj.tca.coilsurface import CoilSurfaces
-from tca_mj.tca.sensing import WireTable, resistance
+from tca_mj.checks import Array, floats, within
+from tca_mj.tca.arrays import column, frozen
+from tca_mj.tca.laws.rod import CoilRods
+from tca_mj.tca.laws.surface import CoilSurfaces
+from tca_mj.tca.sensing.wire import WireTable, resistance
 from tca_mj.tca.spec import TcaSpec, heat_of
-from tca_mj.tca.thermal import HeatStep, power_from_voltage, require_powers
+from tca_mj.tca.supply import UNITS, Supply
+from tca_mj.tca.thermal import HeatStep, power_from_voltage
 
-Array = NDArray[np.float64]
+
+class Signal(NamedTuple):
+    """What actuators show of themselves.
+
+    Attributes:
+        unit: Unit, ``-`` for none.
+        values: Numbers, shape (..., n).
+    """
+
+    unit: str
+    values: Array
 
 
 class TcaMelted(ArithmeticError):
@@ -87,7 +99,9 @@ class TcaBank:
         specs: The n specs.
         n: Number of TCAs.
         law: What computes tension and stiffness.
+        kind: What they are.
         heat: Thermal constants, fields of shape (n,).
+        supply: What a command means; by default it is a power.
         rest_length: Natural lengths, shape (n,) [m].
         minimum_length: Lengths at which the coils touch, shape (n,) [m].
         shortest: Shortest length that ``pull`` accepts, shape (n,) [m].
@@ -97,6 +111,8 @@ class TcaBank:
         melting_temperature: Temperatures that no TCA can have, shape (n,) [°C].
         embedded: Which TCAs lie in a body, shape (n,).
     """
+
+    kind = "TCA"
 
     def __init__(self, specs: Sequence[TcaSpec], law: Literal["rod", "surface"] = "rod") -> None:
         """Gathers the constants of ``specs``, and their surfaces if ``law`` needs them.
@@ -112,23 +128,39 @@ class TcaBank:
         """
         self.specs = tuple(specs)
         self.n = len(self.specs)
-        if self.n == 0:
-            raise ValueError("specs is empty; a bank needs at least 1 TCA")
         if law not in ("rod", "surface"):
-            raise ValueError(f"law = {law!r} must be 'rod' or 'surface'")
+            raise ValueError(f"law must be 'rod' or 'surface', got {law!r}")
         self.law = law
         self._coils: CoilRods | CoilSurfaces
         self._coils = CoilSurfaces(self.specs) if law == "surface" else CoilRods(self.specs)
         self._wire = WireTable.of(self.specs)
         self.heat = heat_of(self.specs)
+        self.supply = Supply()
         self._heating: HeatStep | None = None
-        self.rest_length = _frozen([spec.rest_length for spec in self.specs])
-        self.minimum_length = _frozen([spec.minimum_length for spec in self.specs])
+        self.rest_length = column(self.specs, "rest_length")
+        self.minimum_length = column(self.specs, "minimum_length")
         self.shortest, self.longest = self._coils.shortest, self._coils.longest
-        self.breaking_force = _frozen([spec.breaking_force for spec in self.specs])
-        self.max_temperature = _frozen([spec.fibre.temperature_range[1] for spec in self.specs])
-        self.melting_temperature = _frozen([s.fibre.melting_temperature for s in self.specs])
+        self.breaking_force = column(self.specs, "breaking_force")
+        self.max_temperature = frozen([spec.fibre.temperature_range[1] for spec in self.specs])
+        self.melting_temperature = frozen([s.fibre.melting_temperature for s in self.specs])
         self.embedded = np.array([spec.body is not None for spec in self.specs])
+
+    @property
+    def channels(self) -> dict[str, str]:
+        """Unit of what each TCA is told, by name."""
+        return {self.supply.quantity: UNITS[self.supply.quantity]}
+
+    def checked(self, command: ArrayLike) -> Array:
+        """Commands, shape (n,), in the unit of ``supply``; errors as ``Supply.checked``."""
+        return self.supply.checked(command, self.n)
+
+    def signals(self, state: TcaState, length: ArrayLike) -> dict[str, Signal]:
+        """What TCAs show besides length and tension."""
+        return {
+            "temperature": Signal("°C", state.temperature),
+            "body temperature": Signal("°C", state.body),
+            "resistance": Signal("ohm", self.resistance(state, length)),
+        }
 
     def rest(self, batch_shape: tuple[int, ...] = ()) -> TcaState:
         """The state at ambient temperature with no energy counted, shape batch_shape + (n,)."""
@@ -190,13 +222,13 @@ class TcaBank:
         return Pull(tension, stiffness, length)
 
     def advance(
-        self, state: TcaState, power: ArrayLike, length: ArrayLike, dt: float
+        self, state: TcaState, command: ArrayLike, length: ArrayLike, dt: float
     ) -> tuple[TcaState, Pull]:
         """Heats by ``dt`` at constant power, exactly, then evaluates the pull.
 
         Args:
             state: State at the start, shape (..., n).
-            power: Electrical power, same shape, not negative [W].
+            command: What ``supply`` makes power of, same shape; a power, not negative [W].
             length: Length of every TCA, same shape; the pull is about it [m].
             dt: Length of the step, not negative [s].
 
@@ -209,8 +241,11 @@ class TcaBank:
             TcaMelted: If a TCA would be hotter than its ``melting_temperature``.
             CoilSolveError: If the shape of a coil is not found.
         """
-        power = self._checked(state, "power", power)
-        require_powers(power)
+        power = self.supply.power(
+            self._checked(state, self.supply.quantity, command), state.temperature, state.body,
+            lambda: self.resistance(state, length),
+        )  # fmt: skip
+        within("power", power, at_least=0.0, unit="W")
         step = self._heating
         if step is None or step.heat is not self.heat or step.dt != dt:
             step = self._heating = HeatStep.of(self.heat, dt)
@@ -220,9 +255,7 @@ class TcaBank:
             worst = tuple(int(i) for i in np.argwhere(molten)[0])
             melting = float(self.melting_temperature[worst[-1]])
             raise TcaMelted(worst[-1], float(temperature[worst]), melting)
-        state = TcaState(
-            temperature, body, state.energy_in + power * dt, state.energy_lost + lost
-        )
+        state = TcaState(temperature, body, state.energy_in + power * dt, state.energy_lost + lost)
         return state, self.pull(state, length)
 
     def resistance(self, state: TcaState, length: ArrayLike) -> Array:
@@ -258,13 +291,7 @@ class TcaBank:
         values = floats(name, values)
         shape = state.temperature.shape
         if not shape or shape[-1] != self.n:
-            raise ValueError(f"state has shape {shape}; it must be (..., {self.n})")
+            raise ValueError(f"state must have shape (..., {self.n}), got {shape}")
         if values.shape != shape:
-            raise ValueError(f"{name} has shape {values.shape}; it must equal the state's, {shape}")
+            raise ValueError(f"{name} must have the state's shape {shape}, got {values.shape}")
         return values
-
-
-def _frozen(values: Sequence[float | Array]) -> Array:
-    array = np.array(values, dtype=np.float64)
-    array.setflags(write=False)
-    return array

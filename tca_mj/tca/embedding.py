@@ -19,6 +19,7 @@ per cent (``tests/test_embedding.py`` compares with the diffusion of heat in the
 
 import math
 
+from tca_mj.checks import number, require_positive
 from tca_mj.tca.spec import TcaSpec
 from tca_mj.tca.thermal import BodyHeat
 
@@ -51,11 +52,8 @@ def silicone_body(
     Raises:
         ValueError: If a length is not positive or the share not between 0 and 1.
     """
-    for name, value in (("section", section), ("perimeter", perimeter)):
-        if not 0.0 < value < math.inf:
-            raise ValueError(f"{name} = {value} must be finite and above 0")
-    if not 0.0 <= touching <= 1.0:
-        raise ValueError(f"touching = {touching} must be between 0 and 1")
+    require_positive(section=section, perimeter=perimeter)
+    number("touching", touching, at_least=0.0, at_most=1.0)
     inner = tca.outer_radius
     through = ring_conductance(inner, math.sqrt(inner**2 + section / math.pi))
     loosely = 1.0 / (1.0 / CHANNEL_CONTACT + 1.0 / through)
@@ -80,8 +78,8 @@ def ring_conductance(inner: float, outer: float) -> float:
     Raises:
         ValueError: If they are not 0 < inner < outer.
     """
-    if not 0.0 < inner < outer < math.inf:
-        raise ValueError(f"radii must be 0 < inner < outer, got {inner} and {outer}")
+    require_positive(inner=inner)
+    number("outer", outer, above=inner)
     a, b = inner * inner, outer * outer
     gap = b - a
     shape = b * b * math.log(outer / inner) / gap**2 - (3.0 * b - a) / (4.0 * gap)

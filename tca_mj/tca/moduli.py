@@ -5,15 +5,14 @@ stand on the last axis.
 """
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from tca_mj.checks import floats
+from tca_mj.checks import Array, floats, within
+from tca_mj.tca.arrays import column, frozen
 from tca_mj.tca.spec import FibreSpec
-
-Array = NDArray[np.float64]
 
 
 class FibreTable(NamedTuple):
@@ -32,19 +31,13 @@ class FibreTable(NamedTuple):
     @classmethod
     def of(cls, fibres: Sequence[FibreSpec]) -> "FibreTable":
         """Collects the numbers of ``fibres``, in their order."""
-        a2, a1 = np.array([fibre.growth for fibre in fibres]).T.copy()
-        mu2, mu1, mu0 = np.array([fibre.load_softening for fibre in fibres]).T.copy()
-        return cls(
-            reference_temperature=np.array([fibre.reference_temperature for fibre in fibres]),
-            inserted_twist=np.array([fibre.inserted_twist for fibre in fibres]),
-            untwist_scale=np.array([fibre.untwist_scale for fibre in fibres]),
-            growth=(a2, a1),
-            softening_rate=np.array([fibre.softening_rate for fibre in fibres]),
-            load_softening=(mu2, mu1, mu0),
-        )
+        columns = [column(fibres, name) for name in cls._fields]
+        parts: list[Any] = [tuple(frozen(each.T)) if each.ndim > 1 else each for each in columns]
+        return cls(*parts)
 
 
 Fibres = FibreSpec | FibreTable
+_LEFT = "share of the modulus left at this temperature"
 
 
 def radial_growth(fibre: Fibres, temperature: ArrayLike) -> Array:
@@ -67,10 +60,7 @@ def radial_growth(fibre: Fibres, temperature: ArrayLike) -> Array:
     rise = temperature - fibre.reference_temperature
     a2, a1 = fibre.growth
     with np.errstate(over="ignore", invalid="ignore"):
-        growth = rise * (a1 + a2 * rise)
-    if not np.isfinite(growth).all():
-        raise ValueError(f"temperature = {temperature} °C must be finite, and so the growth")
-    return growth
+        return within("radial growth at this temperature", rise * (a1 + a2 * rise))
 
 
 def untwist(fibre: Fibres, temperature: ArrayLike) -> Array:
@@ -87,10 +77,8 @@ def untwist(fibre: Fibres, temperature: ArrayLike) -> Array:
         ValueError: If the fibre would shrink to nothing (far outside the fitted range), or as
             ``radial_growth``.
     """
-    temperature = floats("temperature", temperature)
     growth = radial_growth(fibre, temperature)
-    if not (growth > -1.0).all():
-        raise ValueError(f"temperature = {temperature} °C leaves the fibre no radius")
+    within("growth of the fibre's radius", growth, above=-1.0)
     twist = fibre.inserted_twist * fibre.untwist_scale
     return -twist * (growth / (1.0 + growth))
 
@@ -119,14 +107,10 @@ def softening(fibre: Fibres, temperature: ArrayLike, torsion: ArrayLike = 0.0) -
     rise = temperature - fibre.reference_temperature
     fall = fibre.softening_rate * rise
     mu2, mu1, mu0 = fibre.load_softening
-    torsion = floats("torsion", torsion)
-    if not np.isfinite(torsion).all():
-        raise ValueError(f"torsion = {torsion} rad/m must be finite")
-    torsion = np.maximum(torsion, 0.0)
+    torsion = np.maximum(within("torsion", torsion), 0.0)
     with np.errstate(over="ignore", invalid="ignore"):
         left = 1.0 - fall * mu0 - np.maximum(fall, 0.0) * (torsion * (mu1 + mu2 * torsion))
-    _require_modulus(left, temperature)
-    return left
+    return within(_LEFT, left, above=0.0)
 
 
 def softened_tension(
@@ -154,12 +138,8 @@ def softened_tension(
     Raises:
         ValueError: If the heat alone leaves no modulus, or a number is not finite.
     """
-    temperature, stiff = floats("temperature", temperature), floats("stiff", stiff)
-    per_tension = floats("torsion_per_tension", torsion_per_tension)
-    for name, array in (("stiff", stiff), ("torsion_per_tension", per_tension)):
-        if not np.isfinite(array).all():
-            raise ValueError(f"{name} = {array} must be finite")
-    return softened(fibre, temperature, stiff, per_tension)
+    stiff, per_tension = within("stiff", stiff), within("torsion_per_tension", torsion_per_tension)
+    return softened(fibre, floats("temperature", temperature), stiff, per_tension)
 
 
 def softened(
@@ -169,19 +149,10 @@ def softened(
     rise = temperature - fibre.reference_temperature
     mu2, mu1, mu0 = fibre.load_softening
     fall = fibre.softening_rate * rise
-    unloaded = 1.0 - fall * mu0
-    _require_modulus(unloaded, temperature)
+    unloaded = within(_LEFT, 1.0 - fall * mu0, above=0.0)
     # Zero for a pushed or a cold coil, which leaves F = f (1 - k mu0).
     load = np.maximum(stiff, 0.0) * np.maximum(fall, 0.0) * torsion_per_tension
     linear = 1.0 + load * mu1
     root = np.sqrt(linear * linear + 4.0 * (load * mu2) * torsion_per_tension * stiff * unloaded)
     left = 2.0 * unloaded / (linear + root)
     return stiff * left, left / root
-
-
-def _require_modulus(left: Array, temperature: Array) -> None:
-    if not ((left > 0.0) & (left < np.inf)).all():
-        raise ValueError(
-            f"temperature = {temperature} °C leaves a modulus E_f/E_f0 of {np.min(left)}; "
-            "it must be above 0"
-        )

@@ -1,4 +1,4 @@
-"""What a twisted-and-coiled actuator (TCA) is made of, and the TCAs that have been published.
+"""What a twisted-and-coiled actuator (TCA) is made of.
 
 "Sun" below is J. Sun's dissertation, Colorado State University; its Chapter 2 and its
 Chapter 3 twist the same thread under the same weight, so that one fibre is behind both, but for
@@ -7,28 +7,17 @@ its own and does not follow from the radius, which is the one that the moduli we
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
-from numbers import Real
-from types import MappingProxyType
 from typing import Literal
 
-import numpy as np
-
+from tca_mj.checks import number, require_positive, within
+from tca_mj.tca.arrays import column
 from tca_mj.tca.mandrel import BRILL_TRANSITION, kept_share
 from tca_mj.tca.thermal import BodyHeat, HeatSpec
 
 _ABSOLUTE_ZERO = -273.15  # [°C]
-
-
-def _require(name: str, value: float, *, above: float, below: float = math.inf) -> None:
-    if not (isinstance(value, Real) and above < value < below):
-        raise ValueError(f"{name} = {value!r} must lie strictly between {above} and {below}")
-
-
-def _require_not_negative(name: str, value: float) -> None:
-    if not (isinstance(value, Real) and 0.0 <= value < math.inf):
-        raise ValueError(f"{name} = {value!r} must be finite and not below 0")
+_UPRIGHT = math.pi / 2.0  # pitch of a straight fibre [rad]
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -84,47 +73,38 @@ class FibreSpec:
     section: Literal["cold", "hot"] = "cold"
 
     def __post_init__(self) -> None:
-        for name in ("radius", "young", "shear", "filament_young", "line_density",
-                     "specific_heat"):  # fmt: skip
-            _require(name, getattr(self, name), above=0.0)
-        for name in ("softening", "inserted_twist", "untwist_scale"):
-            _require_not_negative(name, getattr(self, name))
-        _require("reference_temperature", self.reference_temperature, above=_ABSOLUTE_ZERO)
+        require_positive(
+            radius=self.radius, young=self.young, shear=self.shear, line_density=self.line_density,
+            filament_young=self.filament_young, specific_heat=self.specific_heat,
+        )  # fmt: skip
+        for name in ("inserted_twist", "untwist_scale"):
+            number(name, getattr(self, name), at_least=0.0)
         if self.section not in ("cold", "hot"):
-            raise ValueError(f"section = {self.section!r} must be 'cold' or 'hot'")
-        self._check_polynomials()
-
-    def _check_polynomials(self) -> None:
-        for name in ("load_softening", "expansion", "temperature_range"):
-            values = getattr(self, name)
-            if len(values) != (2 if name == "temperature_range" else 3) or not all(
-                math.isfinite(value) for value in values
-            ):
-                raise ValueError(f"{name} = {values} must hold 3 (a range: 2) finite numbers")
-        low, high = self.temperature_range
-        if not _ABSOLUTE_ZERO < low <= self.reference_temperature < high:
+            raise ValueError(f"section must be 'cold' or 'hot', got {self.section!r}")
+        mu2, mu1, mu0 = within("load_softening", self.load_softening, shape=(3,))
+        c2, c1, c0 = within("expansion", self.expansion, shape=(3,))
+        low, high = within("temperature_range", self.temperature_range, shape=(2,),
+                           above=_ABSOLUTE_ZERO)  # fmt: skip
+        reference = number("reference_temperature", self.reference_temperature)
+        if not low <= reference < high:
             raise ValueError(
-                f"temperature_range = {self.temperature_range} must be above {_ABSOLUTE_ZERO} and "
-                f"hold the reference_temperature {self.reference_temperature} below its upper end"
+                f"temperature_range must hold the reference_temperature {reference} below its"
+                f" upper end, got {self.temperature_range}"
             )
-        _require("melting_temperature", self.melting_temperature, above=high)
-        mu2, mu1, mu0 = self.load_softening
+        number("melting_temperature", self.melting_temperature, above=high)
         if not (mu2 >= 0.0 and mu0 > 0.0 and (mu1 >= 0.0 or mu1 * mu1 < 4.0 * mu2 * mu0)):
             raise ValueError(
-                f"load_softening = {self.load_softening} must be positive for every torsion >= 0"
+                "load_softening must be positive for every torsion from 0 on,"
+                f" got {self.load_softening}"
             )
-        bound = self.filament_young / (high - self.reference_temperature) / mu0
-        if not self.softening < bound:
-            raise ValueError(
-                f"softening = {self.softening} must be below {bound}: no modulus left at {high} °C"
-            )
-        c2, c1, c0 = self.expansion
-        checked = [low, high, self.reference_temperature]
+        bound = self.filament_young / (high - reference) / mu0  # no modulus left at the upper end
+        number("softening", self.softening, at_least=0.0, below=bound)
+        checked = [low, high, reference]
         if c2 != 0.0 and low < -c1 / (2.0 * c2) < high:
             checked.append(-c1 / (2.0 * c2))
         if not all(c2 * t * t + c1 * t + c0 > 0.0 for t in checked):
             raise ValueError(
-                f"expansion = {self.expansion} must be above 0 from {low} to {high} °C"
+                f"expansion must be above 0 from {low} to {high} °C, got {self.expansion}"
             )
 
     @property
@@ -197,23 +177,21 @@ class TcaSpec:
     contact_smoothing: float = 0.005
 
     def __post_init__(self) -> None:
-        for name in ("fibre_length", "breaking_force", "resistance_per_length", "heat_loss",
-                     "contact_ratio"):  # fmt: skip
-            _require(name, getattr(self, name), above=0.0)
-        _require("coil_radius (spring index above 1)", self.coil_radius, above=self.fibre.radius)
-        _require("pitch_angle", self.pitch_angle, above=0.0, below=math.pi / 2.0)
-        _require("minimum_pitch_angle", self.minimum_pitch_angle, above=0.0, below=self.pitch_angle)
-        _require("ambient", self.ambient, above=_ABSOLUTE_ZERO)
-        _require("contact_smoothing", self.contact_smoothing, above=0.0, below=1.0)
-        for name in ("stretch_resistance", "contraction_resistance"):
-            _require_not_negative(name, getattr(self, name))
+        require_positive(
+            fibre_length=self.fibre_length, breaking_force=self.breaking_force,
+            resistance_per_length=self.resistance_per_length, heat_loss=self.heat_loss,
+            contact_ratio=self.contact_ratio,
+        )  # fmt: skip
+        number("coil_radius (spring index above 1)", self.coil_radius, above=self.fibre.radius)
+        number("pitch_angle", self.pitch_angle, above=0.0, below=_UPRIGHT)
+        number("minimum_pitch_angle", self.minimum_pitch_angle, above=0.0, below=self.pitch_angle)
+        number("ambient", self.ambient, above=_ABSOLUTE_ZERO)
+        number("contact_smoothing", self.contact_smoothing, above=0.0, below=1.0)
+        number("contraction_resistance", self.contraction_resistance, at_least=0.0)
         if not isinstance(self.body, BodyHeat | None):
-            raise ValueError(f"body = {self.body!r} must be a BodyHeat or None")
-        if not self.stretch_resistance * (1.0 / math.sin(self.pitch_angle) - 1.0) < 1.0:
-            raise ValueError(
-                f"stretch_resistance = {self.stretch_resistance} leaves no resistance at full "
-                f"stretch; it must be below {1.0 / (1.0 / math.sin(self.pitch_angle) - 1.0)}"
-            )
+            raise ValueError(f"body must be a BodyHeat or None, got {self.body!r}")
+        stretch = max(1.0 / math.sin(self.pitch_angle) - 1.0, 1e-300)  # there no resistance is left
+        number("stretch_resistance", self.stretch_resistance, at_least=0.0, below=1.0 / stretch)
 
     @classmethod
     def from_mandrel(
@@ -247,17 +225,16 @@ class TcaSpec:
         Raises:
             ValueError: If a number is out of range or the coils touch (annealed too cold).
         """
-        _require("fibre_length", fibre_length, above=0.0)
-        _require("core_diameter", core_diameter, above=0.0)
-        _require("groove_pitch_angle", groove_pitch_angle, above=0.0, below=math.pi / 2.0)
+        require_positive(fibre_length=fibre_length, core_diameter=core_diameter)
+        number("groove_pitch_angle", groove_pitch_angle, above=0.0, below=_UPRIGHT)
         radius = 0.5 * core_diameter + fibre.radius
         if minimum_pitch_angle is None:
             minimum_pitch_angle = math.asin(fibre.radius / (math.pi * radius))
-        _require("minimum_pitch_angle", minimum_pitch_angle, above=0.0, below=groove_pitch_angle)
+        number("minimum_pitch_angle", minimum_pitch_angle, above=0.0, below=groove_pitch_angle)
         kept = 1.0
         if annealing_temperature is not None:
-            _require("annealing_temperature", annealing_temperature, above=BRILL_TRANSITION,
-                     below=fibre.melting_temperature)  # fmt: skip
+            number("annealing_temperature", annealing_temperature, above=BRILL_TRANSITION,
+                   below=fibre.melting_temperature)  # fmt: skip
             kept = kept_share(groove_pitch_angle, annealing_temperature)
         contact, made = math.sin(minimum_pitch_angle), math.sin(groove_pitch_angle)
         return cls(
@@ -318,7 +295,7 @@ class TcaSpec:
 
     def of_length(self, rest_length: float) -> "TcaSpec":
         """A piece of the same coil (in the same body) with another natural length [m]."""
-        _require("rest_length", rest_length, above=0.0)
+        require_positive(rest_length=rest_length)
         return replace(self, fibre_length=rest_length / self.rest_length * self.fibre_length)
 
     def of_pitch(self, pitch_angle: float) -> "TcaSpec":
@@ -326,7 +303,7 @@ class TcaSpec:
 
         The coil's radius follows, cos(pitch)/winding; the contact length stays.
         """
-        _require("pitch_angle", pitch_angle, above=0.0, below=math.pi / 2.0)
+        number("pitch_angle", pitch_angle, above=0.0, below=_UPRIGHT)
         radius = math.cos(pitch_angle) / self.winding
         return replace(self, pitch_angle=pitch_angle, coil_radius=radius)
 
@@ -334,111 +311,4 @@ class TcaSpec:
 def heat_of(specs: Sequence[TcaSpec]) -> HeatSpec:
     """Thermal constants of n TCAs, fields of shape (n,) that cannot be written to."""
     heats = [spec.heat for spec in specs]
-    columns = {}
-    for field in fields(HeatSpec):
-        column = np.array([getattr(heat, field.name) for heat in heats], dtype=np.float64)
-        column.setflags(write=False)
-        columns[field.name] = column
-    return HeatSpec(**columns)
-
-
-# Sun, Table 3.1 (radius 0.21 mm, 4.71 rad/mm).
-_THREAD_3 = FibreSpec(load_softening=(3.24e-4, -0.027, 1.0))
-# Sun, Section 2.1.1 and Table 2.1: the same thread, twisted under the same 240 g, with 287 turns on
-# 350 mm. Stiffnesses, softening and expansion are therefore those measured in Chapter 3, on the
-# circle that they were measured with: what is 0.34 mm thick here is a thickness. With the moduli of
-# Chapter 3 on a circle of 0.34 mm, EI and GJ would be 2.3 times too small, and the published pull,
-# temporary length and loaded stroke of these TCAs are missed (``tca_mj.validation.threads``).
-# Five TCAs weigh 0.16 g, one 0.03 g: 32 mg on 350 mm, as weighed. (350 mm of the thread before it
-# is twisted would be 33 mg, 350 mm after it, as the lengths of Table 2.1 need, 41 mg.)
-_THREAD_2 = replace(
-    _THREAD_3, inserted_twist=2.0 * math.pi * 287.0 / 0.350, line_density=32e-6 / 0.350
-)
-
-
-# All TCAs of Chapter 2 have the resistance of the same thread (Sun, Section 2.2.2). Table 2.3 has
-# 6.7 ohm/dm and does not say of what. "Around 80 mA" at 0.8 V (Section 2.3.1) are 10 ohm and chose
-# the made length, 8.9 ohm (89 mA); the natural one would be 7.4 ohm, the thread 23 ohm [ohm].
-_THREAD_OHMS = 67.0 * 0.1335
-# Heat that these TCAs lose, per length of thread: fitted to the largest displacement, 60 mm after
-# 1 A for 2 s under 20 g (Section 2.2.2). 56 mW/K of 350 mm lie between the 32 and 64 mW/K that an
-# infrared camera gives (1 to 2 °C at those 64 mW). They are twice what was identified in Chapter 3
-# (``TcaSpec.heat_loss``), and more than still air takes: ``tca_mj.validation.heat`` has the table
-# of both [W/(m K)].
-_AIR_LOSS = 0.0555 / 0.350
-
-
-def _type(natural: float, contact: float = 0.350 * math.sin(math.radians(11.53))) -> TcaSpec:
-    """Sun, Table 2.1: 350 mm of thread; the lengths are taken, the natural pitch follows.
-
-    The coil radius is that of the outer diameter, (1.08 - 0.34)/2 mm, and agrees with mandrel and
-    thread, (0.405 + 0.34)/2 mm. Coils that were made in a groove touch at the made length of type
-    0: 11.53°, 70 mm. Resistance and loss are those of Chapter 2, see above.
-    """
-    return TcaSpec(
-        fibre=_THREAD_2,
-        fibre_length=0.350,
-        coil_radius=0.37e-3,
-        pitch_angle=math.asin(natural / 0.350),
-        minimum_pitch_angle=math.asin(contact / 0.350),
-        resistance_per_length=_THREAD_OHMS / natural,
-        stretch_resistance=0.55 / _THREAD_OHMS / 0.5,
-        heat_loss=_AIR_LOSS,
-    )
-
-
-# Sun, Table 3.2, free-stroke: 175 mm of fibre made at 22.42° with a coil radius of 0.408 mm.
-# The coils touch at the close packing of that helix, asin(fibre diameter / (2 pi r)) = 9.43°:
-# 36 % below the natural length of 45 mm, like the measured 35.7 % of type 2-180 (Table 2.1).
-_FREE_STROKE_MADE = TcaSpec(
-    fibre=_THREAD_3,
-    fibre_length=0.175,
-    coil_radius=0.408e-3,
-    pitch_angle=math.radians(22.42),
-    minimum_pitch_angle=math.asin(0.42 / (2.0 * math.pi * 0.408)),
-)
-# The same at its natural length of 45 mm: 14.90°; the number of coils is kept, so that
-# r = 0.408 mm cos(14.90°)/cos(22.42°) = 0.427 mm.
-_FREE_STROKE = replace(
-    _FREE_STROKE_MADE,
-    pitch_angle=math.asin(0.045 / 0.175),
-    coil_radius=math.cos(math.asin(0.045 / 0.175)) / _FREE_STROKE_MADE.winding,
-)
-# Sun, Table 3.2, self-coiled. Fitted to its measured stroke: 1.6 times the untwist (comment in
-# the code published with Sun et al., github.com/jiefengsun/TCA-TRO). The load does not soften it:
-# the published polynomial would leave no modulus at the 200 g that it lifts. Contact: close
-# packing. Breaking force: an estimate from the 240 g under which the thread is twisted, above
-# which it "may easily break" (Section 2.1.1).
-_SELF_COILED = TcaSpec(
-    fibre=FibreSpec(untwist_scale=1.6),
-    fibre_length=0.175,
-    coil_radius=0.227e-3,
-    pitch_angle=math.radians(18.66),
-    minimum_pitch_angle=math.asin(0.42 / (2.0 * math.pi * 0.227)),
-    breaking_force=0.240 * 9.81,
-)
-
-# The free-stroke TCA after it has crept under a weight in grams, which is its reference under that
-# weight: pitch angles in the code published with Sun et al., github.com/jiefengsun/TCA-TRO. 15°
-# at 0 g is the natural length.
-FREE_STROKE_CREPT: Mapping[str, TcaSpec] = MappingProxyType(
-    {
-        f"{weight} g": _FREE_STROKE_MADE.of_pitch(math.radians(pitch))
-        for weight, pitch in ((0, 15.0), (2, 16.0), (30, 20.0), (60, 22.0))
-    }
-)
-
-CATALOGUE: Mapping[str, TcaSpec] = MappingProxyType(
-    {
-        # The contact length of type 0 follows from its free stroke of 5.7 %: the coils must touch
-        # below its natural length, which is shorter than its made length.
-        "type-0-180": _type(0.061, contact=0.061 * (1.0 - 0.057)),
-        "type-1-180": _type(0.088),
-        "type-2-180": _type(0.109),
-        "type-1-200": _type(0.096),
-        "type-2-200": _type(0.134),
-        "free-stroke": _FREE_STROKE,
-        "free-stroke-made": _FREE_STROKE_MADE,
-        "self-coiled": _SELF_COILED,
-    }
-)
+    return HeatSpec(**{field.name: column(heats, field.name) for field in fields(HeatSpec)})

@@ -10,17 +10,13 @@ Without conductance G the TCA is alone, with an infinite one the two are a singl
 C + C_b and loss λ + λ_b.
 """
 
-import math
 from dataclasses import dataclass
-from numbers import Real
 from typing import NamedTuple, Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from tca_mj.checks import floats
-
-Array = NDArray[np.float64]
+from tca_mj.checks import Array, floats, number, require_positive, within
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -48,16 +44,12 @@ class HeatSpec:
     body_loss: float | Array = 0.0
 
     def __post_init__(self) -> None:
-        for name, low, least in (
-            ("capacity", 0.0, False), ("loss", 0.0, True), ("ambient", -273.15, False),
-            ("conductance", 0.0, True), ("body_capacity", 0.0, False), ("body_loss", 0.0, True),
-        ):  # fmt: skip
-            value = floats(name, getattr(self, name))
-            if not np.all(((value > low) | (least & (value == low))) & np.isfinite(value)):
-                bound = f"not below {low}" if least else f"above {low}"
-                raise ValueError(f"{name} = {value} must be finite and {bound}")
-        if not np.all(floats("loss", self.loss) + self.conductance > 0.0):
-            raise ValueError(f"loss = {self.loss} must be above 0 where there is no conductance")
+        within("ambient", self.ambient, above=-273.15, unit="°C")
+        for name in ("capacity", "body_capacity"):
+            within(name, getattr(self, name), above=0.0)
+        for name in ("loss", "conductance", "body_loss"):
+            within(name, getattr(self, name), at_least=0.0)
+        within("loss + conductance", np.add(self.loss, self.conductance), above=0.0)
 
     @property
     def time_constant(self) -> float | Array:
@@ -118,10 +110,7 @@ class BodyHeat:
     loss: float
 
     def __post_init__(self) -> None:
-        for name in ("conductance", "capacity", "loss"):
-            value = getattr(self, name)
-            if not (isinstance(value, Real) and 0.0 < float(value) < math.inf):
-                raise ValueError(f"{name} = {value!r} must be finite and above 0")
+        require_positive(conductance=self.conductance, capacity=self.capacity, loss=self.loss)
 
 
 class HeatStep(NamedTuple):
@@ -160,8 +149,7 @@ class HeatStep(NamedTuple):
         Raises:
             ValueError: If ``dt`` is negative or not finite.
         """
-        if not 0.0 <= dt < math.inf:
-            raise ValueError(f"dt = {dt} must be finite and not below 0")
+        number("dt", dt, at_least=0.0, unit="s")
         capacity, body = np.asarray(heat.capacity), np.asarray(heat.body_capacity)
         loss, out, through = heat.loss, heat.body_loss, heat.conductance
         first, second = (loss + through) / capacity, (out + through) / body
@@ -202,9 +190,7 @@ class HeatStep(NamedTuple):
             passed=loss * rose / capacity + out * crossed,
         )  # fmt: skip
 
-    def advance(
-        self, temperature: Array, body: Array, power: Array
-    ) -> tuple[Array, Array, Array]:
+    def advance(self, temperature: Array, body: Array, power: Array) -> tuple[Array, Array, Array]:
         """Temperatures of TCA and body at the end, shape (..., n) [°C]; heat lost meanwhile [J].
 
         The heat is the integral of the balances and not the difference of energy in and energy
@@ -234,9 +220,7 @@ def _second_integral(rate: Array, dt: float) -> Array:
     return np.where(z < 5e-3, series * dt * dt, (dt - _integral(rate, dt)) / safe)
 
 
-def step_temperature(
-    temperature: ArrayLike, power: ArrayLike, heat: HeatSpec, dt: float
-) -> Array:
+def step_temperature(temperature: ArrayLike, power: ArrayLike, heat: HeatSpec, dt: float) -> Array:
     """Advances the temperature of what is bare by ``dt`` under constant power, exactly.
 
     Solves C dT/dt = P - λ (T - T_amb) [Sun, dissertation, Colorado State University, eq. (3.1);
@@ -256,15 +240,11 @@ def step_temperature(
         ValueError: If a power is negative (a heater cannot cool), if ``dt`` is negative, if there
             is a body, or if any of the numbers is not finite.
     """
-    temperature, power = _checked(temperature, power, dt)
-    require_bare(heat)
-    settled = heat.ambient + power / heat.loss
-    return temperature - (settled - temperature) * np.expm1(-dt * heat.loss / heat.capacity)
+    temperature, power = _checked(temperature, power, heat, dt)
+    return bare_step(temperature, power, heat.capacity, heat.loss, heat.ambient, dt)[0]
 
 
-def heat_lost(
-    temperature: ArrayLike, power: ArrayLike, heat: HeatSpec, dt: float
-) -> Array:
+def heat_lost(temperature: ArrayLike, power: ArrayLike, heat: HeatSpec, dt: float) -> Array:
     """Heat given to the surroundings during a step, ∫ λ (T - T_amb) dt, exactly.
 
     This is the integral of the temperature's course in closed form and not the difference of
@@ -282,12 +262,25 @@ def heat_lost(
     Raises:
         ValueError: As ``step_temperature``.
     """
-    temperature, power = _checked(temperature, power, dt)
-    require_bare(heat)
+    temperature, power = _checked(temperature, power, heat, dt)
+    return bare_step(temperature, power, heat.capacity, heat.loss, heat.ambient, dt)[1]
+
+
+def bare_step(
+    temperature: Array,
+    power: Array,
+    capacity: float | Array,
+    loss: float | Array,
+    ambient: float | Array,
+    dt: float,
+) -> tuple[Array, Array]:
+    """Both of these at once: temperature at the end [°C] and heat lost [J]. Nothing is checked."""
     # The start's excess dies out, the power's builds up: T - T_amb = x e + (P/λ) (1 - e).
-    died_out = -np.expm1(-dt * heat.loss / heat.capacity)
-    of_start = heat.capacity * (temperature - heat.ambient) * died_out
-    return of_start + power * (dt - heat.time_constant * died_out)
+    fading = np.expm1(-dt * loss / capacity)
+    settled = ambient + power / loss
+    of_start = capacity * (temperature - ambient) * -fading
+    lost = of_start + power * (dt - capacity / loss * -fading)
+    return temperature - (settled - temperature) * fading, lost
 
 
 def require_bare(heat: HeatSpec) -> None:
@@ -296,21 +289,7 @@ def require_bare(heat: HeatSpec) -> None:
     Raises:
         ValueError: If there is a conductance to a body.
     """
-    if np.any(np.asarray(heat.conductance) > 0.0):
-        raise ValueError(
-            f"conductance = {heat.conductance} must be 0 here: a bare TCA has one temperature;"
-            " HeatStep has two"
-        )
-
-
-def require_powers(power: Array) -> None:
-    """Refuses powers that are negative or not finite.
-
-    Raises:
-        ValueError: If there is one.
-    """
-    if not ((power >= 0.0) & (power < math.inf)).all():
-        raise ValueError(f"power = {power} must be finite and not below 0: a heater cannot cool")
+    within("conductance of a bare TCA", heat.conductance, at_most=0.0)
 
 
 def power_from_voltage(voltage: ArrayLike, resistance: ArrayLike) -> Array:
@@ -326,27 +305,15 @@ def power_from_voltage(voltage: ArrayLike, resistance: ArrayLike) -> Array:
     Raises:
         ValueError: If a voltage is not finite or a resistance not positive and finite.
     """
-    voltage = floats("voltage", voltage)
-    resistance = floats("resistance", resistance)
-    if not np.isfinite(voltage).all():
-        raise ValueError(f"voltage = {voltage} must be finite")
-    if not ((resistance > 0.0) & (resistance < math.inf)).all():
-        raise ValueError(f"resistance = {resistance} must be finite and above 0")
+    voltage = within("voltage", voltage)
+    resistance = within("resistance", resistance, above=0.0, unit="ohm")
     with np.errstate(over="ignore"):
-        power = voltage * voltage / resistance
-    if not np.isfinite(power).all():
-        raise ValueError(f"voltage = {voltage} V and resistance = {resistance} ohm give no power")
-    return power
+        return within("voltage^2/resistance", voltage * voltage / resistance)
 
 
 def _checked(
-    temperature: ArrayLike, power: ArrayLike, dt: float
+    temperature: ArrayLike, power: ArrayLike, heat: HeatSpec, dt: float
 ) -> tuple[Array, Array]:
-    temperature = floats("temperature", temperature)
-    power = floats("power", power)
-    if not np.isfinite(temperature).all():
-        raise ValueError(f"temperature = {temperature} must be finite")
-    require_powers(power)
-    if not 0.0 <= dt < math.inf:
-        raise ValueError(f"dt = {dt} must be finite and not below 0")
-    return temperature, power
+    number("dt", dt, at_least=0.0, unit="s")
+    require_bare(heat)
+    return within("temperature", temperature), within("power", power, at_least=0.0, unit="W")

@@ -14,26 +14,22 @@ from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.optimize import brentq, minimize_scalar
 
-from tca_mj.checks import floats
+from tca_mj.checks import Array, require_positive, within
 from tca_mj.modules.bending import BendingSpec, bending_module
 from tca_mj.sim import Simulation
 from tca_mj.tca.embedding import CHANNEL_CONTACT
 
-Array = NDArray[np.float64]
-
 GRAVITY = 9.81  # [m/s²]
 # Gravity in the module's frame, base at the origin, z along the cold module, TCA 1 on x [m/s²].
-ATTITUDES: Mapping[str, tuple[float, float, float]] = MappingProxyType(
-    {
-        "standing": (0.0, 0.0, -GRAVITY),
-        "hanging": (0.0, 0.0, GRAVITY),
-        "lying": (0.0, -GRAVITY, 0.0),
-        "weightless": (0.0, 0.0, 0.0),
-    }
-)
+ATTITUDES: Mapping[str, tuple[float, float, float]] = MappingProxyType({
+    "standing": (0.0, 0.0, -GRAVITY),
+    "hanging": (0.0, 0.0, GRAVITY),
+    "lying": (0.0, -GRAVITY, 0.0),
+    "weightless": (0.0, 0.0, 0.0),
+})  # fmt: skip
 JUDGED = "standing"
 TIME = 2.0  # of heating, Sun, Section 4.1.3 [s]
 _SETTLING = 2.0  # in the attitude, before that [s]
@@ -61,9 +57,7 @@ def arc(bend: Bend, length: float) -> Array:
     angle = bend.angle
     across = length * math.sin(angle / 2.0) * float(np.sinc(angle / (2.0 * math.pi)))
     along = length * float(np.sinc(angle / math.pi))
-    return np.array(
-        [across * math.cos(bend.direction), across * math.sin(bend.direction), along]
-    )
+    return np.array([across * math.cos(bend.direction), across * math.sin(bend.direction), along])
 
 
 def by_place(tip: ArrayLike, length: float) -> Bend:
@@ -80,17 +74,14 @@ def by_place(tip: ArrayLike, length: float) -> Bend:
     Raises:
         ValueError: If the place is not three finite numbers or the length not positive.
     """
-    tip = floats("tip", tip)
-    if tip.shape != (3,) or not np.isfinite(tip).all():
-        raise ValueError(f"tip must be three finite numbers, got {tip}")
-    if not 0.0 < length < math.inf:
-        raise ValueError(f"length = {length} must be finite and above 0")
-    aside = math.hypot(tip[0], tip[1])
-    direction = math.atan2(tip[1], tip[0]) if aside > 0.0 else 0.0
+    x, y, z = within("tip", tip, shape=(3,))
+    require_positive(length=length)
+    aside = math.hypot(x, y)
+    direction = math.atan2(y, x) if aside > 0.0 else 0.0
 
     def square(angle: float) -> float:
         near = arc(Bend(angle, 0.0), length)
-        return ((near[0] - aside) ** 2 + (near[2] - tip[2]) ** 2) / length**2
+        return ((near[0] - aside) ** 2 + (near[2] - z) ** 2) / length**2
 
     grid = np.linspace(0.0, math.pi, 181)
     best = int(np.argmin([square(angle) for angle in grid]))
@@ -185,15 +176,10 @@ def conductance(contact: float) -> float:
     return 1.0 / (1.0 / contact + silicone)
 
 
-def contact_for(
-    attitude: str, angle: float = 120.0, power: tuple[float, float] = (2.0, 0.4)
-) -> float:
-    """Contact with which a power bends by an angle [deg], by place [W/(m K)]."""
-
-    def short(contact: float) -> float:
-        return bent(attitude, power, contact=contact).place - angle
-
-    return float(brentq(short, 0.1, 0.6, xtol=1e-3))
+def contact_for(attitude: str) -> float:
+    """Contact with which 2 W and 0.4 W bend by 120°, by place [W/(m K)]."""
+    return float(brentq(lambda contact: bent(attitude, (2.0, 0.4), contact=contact).place - 120.0,
+                        0.1, 0.6, xtol=1e-3))  # fmt: skip
 
 
 def in_free_air() -> float:

@@ -3,14 +3,12 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tca_mj.checks import Array
 from tca_mj.tca import CATALOGUE, TcaSpec, hanging_length
-from tca_mj.tca.creep import CreepBank, CreepSpec, CreepState, aged, relaxation_time
+from tca_mj.tca.laws.creep import CreepBank, CreepSpec, aged, relaxation_time
 from tca_mj.validation.facts import Finding, fitted, trend
 from tca_mj.validation.strokes import Ends, contraction, weight
-
-Array = NDArray[np.float64]
 
 _HOUR = 3600.0
 _SOURCE = "Section 2.2.2"
@@ -21,21 +19,19 @@ _LOADED, _HEATED, _HOT, _COOLED = 120.0, 300.0, 4.0, 100.0
 def four_lengths(tca: TcaSpec, ends: Ends) -> Array:
     """Lengths l1 to l4 [mm]: natural; just loaded with 20 g; crept; unloaded again."""
     bank, load = CreepBank([tca]), weight(20)
-
-    def length(state: CreepState, force: float) -> float:
-        (now,) = bank.crept(state)
-        return 1e3 * float(hanging_length(now, 25.0, force, spin=ends))
-
-    crept = bank.cycle(bank.rest(), load)
-    return np.array([length(bank.rest(), 0.0), length(bank.rest(), load), length(crept, load),
-                     length(crept, 0.0)])  # fmt: skip
+    (crept,) = bank.crept(bank.cycle(bank.rest(), load))
+    return np.array([
+        1e3 * float(hanging_length(now, 25.0, force, spin=ends))
+        for now, force in ((tca, 0.0), (tca, load), (crept, load), (crept, 0.0))
+    ])  # fmt: skip
 
 
 def temporary_length() -> list[Finding]:
     """Order l1 < l2 < l4 < l3, and what was fitted."""
     rows = []
-    for ends, name in (("locked", "glued"), ("free", "free to spin")):
-        l1, l2, l3, l4 = four_lengths(CATALOGUE["type-1-180"], ends)  # type: ignore[arg-type]
+    named: dict[Ends, str] = {"locked": "glued", "free": "free to spin"}
+    for ends, name in named.items():
+        l1, l2, l3, l4 = four_lengths(CATALOGUE["type-1-180"], ends)
         rows.append(trend(
             _SOURCE, f"20 g on type 1-180, ends {name}", "l1 < l2 < l4 < l3", "l1 < l2 < l4 < l3",
             f"{l1:.1f}, {l2:.1f}, {l4:.1f}, {l3:.1f} mm", bool(l1 < l2 < l4 < l3), strict=True,
@@ -46,26 +42,24 @@ def temporary_length() -> list[Finding]:
             " said; creep was fitted to another TCA, and with glued ends the order holds by"
             " 0.9 mm only.",
         ))  # fmt: skip
-    creep = CreepSpec()
     bank = CreepBank([CATALOGUE["type-1-180"]])
     after = bank.step(bank.rest(), weight(20), 25.0, 20.0 * _HOUR)
     done = 100.0 * float(after.shift[0] / bank.settled([weight(20)])[0])
-    hot = float(relaxation_time(150.0, creep))
-    rows += [
+    hot = float(relaxation_time(150.0, CreepSpec()))
+    return [
+        *rows,
         fitted(_SOURCE, "creep at room temperature", "about 20 h", f"{done:.0f} % done in 20 h",
                "`CreepSpec.room_time`.", value=done),
         fitted(_SOURCE, "creep when hot", "within a heating cycle", f"{hot:.1f} s at 150 °C",
                "`CreepSpec.activation`, with 1 s as an estimate.", value=hot),
     ]  # fmt: skip
-    return rows
 
 
 def ageing() -> list[Finding]:
     """Loss of stroke in 10,000 cycles at 2 MPa, 20 g."""
     new = CATALOGUE["type-1-180"]
     old = aged(new, 10e3, CreepSpec())
-    strokes = [contraction(tca, 20, 100.0) for tca in (new, old)]
-    loss = 100.0 * (1.0 - strokes[1] / strokes[0])
+    loss = 100.0 * (1.0 - contraction(old, 20, 100.0) / contraction(new, 20, 100.0))
     return [fitted(_SOURCE, "stroke after 10,000 cycles at 0.25 Hz, 2 MPa", "2 % less",
                    f"{loss:.1f} % less", "`CreepSpec.ageing_loss`.", value=loss)]  # fmt: skip
 
@@ -89,9 +83,7 @@ def experiment() -> Experiment:
     """Runs it, heated to 150 °C for a few seconds at a time."""
     bank = CreepBank([CATALOGUE["type-1-180"]])
     state, now = bank.rest(), 0.0
-    times: list[float] = []
-    lengths: list[float] = []
-    events = []
+    rows, events = [], []
     plan = (  # duration, load [g], temperature, what begins
         (_LOADED, 0.0, 25.0, "no load"), (_HEATED, 20.0, 25.0, "20 g"),
         (_HOT, 20.0, 150.0, "heated"), (_COOLED, 20.0, 25.0, "cold"),
@@ -105,9 +97,9 @@ def experiment() -> Experiment:
             now += step
             (tca,) = bank.crept(state)
             length = hanging_length(tca, temperature, weight(grams), spin="locked")
-            times.append(now)
-            lengths.append(1e3 * float(length))
-    return Experiment(np.array(times), np.array(lengths), tuple(events))
+            rows.append((now, 1e3 * float(length)))
+    time, length = np.array(rows).T
+    return Experiment(time, length, tuple(events))
 
 
 def findings() -> list[Finding]:

@@ -11,14 +11,13 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import brentq
 
+from tca_mj.checks import Array, number, require_positive
 from tca_mj.tca import CATALOGUE, CoilRods, TcaSpec, tension
 from tca_mj.validation.facts import Finding, check, not_covered
 from tca_mj.validation.strokes import TYPES
 
-Array = NDArray[np.float64]
 Pull = Callable[[float, float], float]
 """(length [m], temperature [°C]) -> tension of one TCA [N]."""
 
@@ -58,12 +57,7 @@ class Dragged:
 def pull_of(tca: TcaSpec) -> Pull:
     """Tension of a TCA with glued ends, not below 0."""
     coil = CoilRods([tca])
-
-    def pull(length: float, temperature: float) -> float:
-        found, _ = coil.tension(np.array([length]), np.array([temperature]))
-        return max(float(found[0]), 0.0)
-
-    return pull
+    return lambda length, hot: max(float(coil.tension([length], [hot])[0][0]), 0.0)
 
 
 def drag(
@@ -87,10 +81,8 @@ def drag(
     Raises:
         ValueError: If mass or step is not above 0, or friction below 0.
     """
-    if not (mass > 0.0 and dt > 0.0 and friction >= 0.0):
-        raise ValueError(
-            f"mass = {mass} and dt = {dt} must be above 0, friction = {friction} not below"
-        )
+    require_positive(mass=mass, dt=dt)
+    number("friction", friction, at_least=0.0)
     moved, speed, work, rubbed = 0.0, 0.0, 0.0, 0.0
     rows = []
     for hot in temperature:
@@ -126,21 +118,20 @@ def study(to: float, count: int = 1, rate: float = _HEATING) -> Dragged:
 def findings() -> list[Finding]:
     """The pull, the way of one, and the kettle."""
     tca = CATALOGUE[NAME]
-    blocked = float(tension(tca, tca.rest_length, DATA, spin="locked")[0])
+
+    def holds(length: float, hot: float) -> float:
+        return float(tension(tca, length, hot, spin="locked")[0])
+
+    blocked = holds(tca.rest_length, DATA)
     # Heated at once it swings past the balance, and the mass does not matter: the furthest of all.
     share, slow = (100.0 * float(study(ANNEALED, rate=rate).moved[-1]) / tca.rest_length
                    for rate in (1e4, 5.0))  # fmt: skip
     touching = (1.0 - 0.01 * STROKE) * tca.rest_length + 0.5e-3
-    slides = float(tension(tca, touching, ANNEALED, spin="locked")[0])
-
-    def short(hot: float) -> float:
-        return float(tension(tca, touching, hot, spin="locked")[0]) - FRICTION
-
-    ends = brentq(short, ANNEALED, 259.0, xtol=0.1)
+    slides = holds(touching, ANNEALED)
+    ends = brentq(lambda hot: holds(touching, hot) - FRICTION, ANNEALED, 259.0, xtol=0.1)
     mass, count, way = KETTLE
     source = "Section 2.1.1"
-    length = tca.rest_length - 1e-3 * way
-    five = count * float(tension(tca, length, ANNEALED, spin="locked")[0])
+    five = count * holds(tca.rest_length - 1e-3 * way, ANNEALED)
     return [
         check(source, f"pull of {NAME} at its natural length, 160 °C",
               "overcomes a peak friction of 0.4 N", blocked, FRICTION, np.inf, "N", digits=2,

@@ -8,16 +8,16 @@ a constant of the model is *fitted*, whatever its value: agreement with it prove
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, get_args
+
+from tca_mj import pages
 
 Verdict = Literal["held", "missed", "trend held", "trend missed", "fitted", "not covered"]
-VERDICTS: tuple[Verdict, ...] = (
-    "held", "missed", "trend held", "trend missed", "fitted", "not covered",
-)  # fmt: skip
+VERDICTS: tuple[Verdict, ...] = get_args(Verdict)
 _UNKNOWN = "No reason is known."
 
 
-@dataclass(frozen=True, kw_only=True, slots=True)
+@dataclass(frozen=True, slots=True)
 class Finding:
     """One row of a report.
 
@@ -44,23 +44,14 @@ class Finding:
 
     def __post_init__(self) -> None:
         if self.verdict not in VERDICTS:
-            raise ValueError(f"verdict = {self.verdict!r} must be one of {VERDICTS}")
-        if self.verdict != "held" and self.verdict != "trend held" and not self.reason:
-            raise ValueError(f"reason of {self.fact!r} ({self.verdict}) must not be empty")
+            raise ValueError(f"verdict must be one of {VERDICTS}, got {self.verdict!r}")
+        if not self.verdict.endswith("held") and not self.reason:
+            raise ValueError(f"reason must say why {self.fact!r} is {self.verdict}, got none")
 
 
 def check(
-    source: str,
-    fact: str,
-    published: str,
-    value: float,
-    low: float,
-    high: float,
-    unit: str,
-    *,
-    digits: int = 1,
-    reason: str = "",
-    note: str = "",
+    source: str, fact: str, published: str, value: float, low: float, high: float, unit: str, *,
+    digits: int = 1, reason: str = "", note: str = "",
 ) -> Finding:
     """A fact with a band: held if low <= value <= high.
 
@@ -80,33 +71,20 @@ def check(
         ValueError: If the band is empty or is all numbers.
     """
     if not (low < high and (low > -math.inf or high < math.inf)):
-        raise ValueError(f"band {low} to {high} of {fact!r} must hold some numbers and not all")
-    held = low <= value <= high
+        raise ValueError(f"band must hold some numbers and not all, got {low} to {high}")
+    least, most, model = (f"{number:.{digits}f}" for number in (low, high, value))
+    band = f"{least} to {most} {unit}"
     if low == -math.inf:
-        band = f"at most {high:.{digits}f} {unit}"
+        band = f"at most {most} {unit}"
     elif high == math.inf:
-        band = f"at least {low:.{digits}f} {unit}"
-    else:
-        band = f"{low:.{digits}f} to {high:.{digits}f} {unit}"
-    return Finding(
-        source=source, fact=fact, published=published, band=band,
-        model=f"{value:.{digits}f} {unit}", verdict="held" if held else "missed",
-        reason=_joined(note, "" if held else reason or _UNKNOWN), value=float(value),
-    )  # fmt: skip
+        band = f"at least {least} {unit}"
+    return trend(source, fact, published, band, f"{model} {unit}", low <= value <= high,
+                 reason=reason, note=note, value=float(value), strict=True)  # fmt: skip
 
 
 def trend(
-    source: str,
-    fact: str,
-    published: str,
-    order: str,
-    model: str,
-    held: bool,
-    *,
-    reason: str = "",
-    note: str = "",
-    value: float | None = None,
-    strict: bool = False,
+    source: str, fact: str, published: str, order: str, model: str, held: bool, *,
+    reason: str = "", note: str = "", value: float | None = None, strict: bool = False,
 ) -> Finding:
     """A fact with a sign or an order.
 
@@ -125,34 +103,31 @@ def trend(
     verdict: Verdict = "trend held" if held else "trend missed"
     if strict:
         verdict = "held" if held else "missed"
-    return Finding(
-        source=source, fact=fact, published=published, band=order, model=model,
-        verdict=verdict, reason=_joined(note, "" if held else reason or _UNKNOWN), value=value,
-    )  # fmt: skip
+    said = " ".join(part for part in (note, "" if held else reason or _UNKNOWN) if part)
+    return Finding(source, fact, published, order, model, verdict, said, value)
 
 
 def fitted(
     source: str, fact: str, published: str, model: str, to: str, *, value: float | None = None
 ) -> Finding:
     """A fact that fixed a constant; ``to`` says which constant."""
-    return Finding(source=source, fact=fact, published=published, band="-", model=model,
-                   verdict="fitted", reason=to, value=value)  # fmt: skip
+    return Finding(source, fact, published, "-", model, "fitted", to, value)
 
 
 def not_covered(source: str, fact: str, published: str, reason: str) -> Finding:
     """A fact that needs something that is not in these models."""
-    return Finding(source=source, fact=fact, published=published, band="-", model="-",
-                   verdict="not covered", reason=reason)  # fmt: skip
+    return Finding(source, fact, published, "-", "-", "not covered", reason)
 
 
 def table(findings: Iterable[Finding]) -> str:
     """The findings as a table in Markdown, reasons not included: see ``reasons``."""
-    lines = ["| source | fact | published | band | model | verdict |", "|---" * 6 + "|"]
+    rows = []
     for row in findings:
         verdict = f"**{row.verdict}**" if "missed" in row.verdict else row.verdict
         cells = (row.source, row.fact, row.published, row.band, row.model, verdict)
-        lines.append("| " + " | ".join(cell.replace("|", "/") for cell in cells) + " |")
-    return "\n".join(lines)
+        rows.append([cell.replace("|", "/") for cell in cells])
+    heads = ["source", "fact", "published", "band", "model", "verdict"]
+    return "\n".join(pages.table(heads, rows))
 
 
 def reasons(findings: Iterable[Finding]) -> str:
@@ -167,7 +142,3 @@ def reasons(findings: Iterable[Finding]) -> str:
 def tally(findings: Sequence[Finding]) -> dict[Verdict, int]:
     """Number of findings by verdict."""
     return {verdict: sum(row.verdict == verdict for row in findings) for verdict in VERDICTS}
-
-
-def _joined(*parts: str) -> str:
-    return " ".join(part for part in parts if part)

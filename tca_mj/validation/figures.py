@@ -9,28 +9,38 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike
 
-from tca_mj.plots import temperature_colour
-from tca_mj.tca import CATALOGUE, hanging_length, softening, untwist
-from tca_mj.tca.dynamics import Heating, Load, LoadedTcas
+from tca_mj.record.plots import temperature_colour
+from tca_mj.tca import CATALOGUE, Load, LoadedTcas, hanging_length, softening, untwist
 from tca_mj.validation import drag, lifting, sensors, strokes, theories
-from tca_mj.validation.creeping import Experiment, four_lengths
-from tca_mj.validation.race import Race
-from tca_mj.validation.strokes import weight
-
-Array = NDArray[np.float64]
+from tca_mj.validation.creeping import experiment, four_lengths
+from tca_mj.validation.race import race
+from tca_mj.validation.strokes import heat_up, weight
 
 _BLUE, _SKY, _GREEN, _ORANGE, _VIOLET = "#0072b2", "#56b4e9", "#009e73", "#d55e00", "#8a4fa3"
 _COLOURS = (_BLUE, _ORANGE, _GREEN, _VIOLET, _SKY)
+_SHADES = {theories.ROD: _BLUE, theories.CST: _GREEN, theories.LOVE: _ORANGE}
 _GREY = "#ececec"
 _DATA_END = 160.0  # upper end of the measurements behind expansion and softening [°C]
 _SPRING = 10.0  # stiffness of case 2, not published: an estimate [N/m]
 
 
-def strokes_figure(figure: Any, race: Race) -> None:
+def _curves(
+    axis: Any, x: ArrayLike, curves: Mapping[str, ArrayLike], lw: float = 2
+) -> None:
+    """Draws named curves over the same x, in the common colours."""
+    for (name, y), colour in zip(curves.items(), _COLOURS, strict=False):
+        axis.plot(x, y, color=colour, lw=lw, label=name)
+
+
+def _limit(axis: Any, height: float) -> None:
+    axis.axhline(height, color="#666666", lw=1, ls="--")
+
+
+def strokes_figure(figure: Any) -> None:
     """Displacement and length over temperature of two types, and the race of four; as Fig. 2.5."""
-    ((a, b), (c, d)) = figure.subplots(2, 2)
+    ((a, b), (c, d)), run = figure.subplots(2, 2), race()
     hot = np.linspace(25.0, 180.0, 156)
     for name, shade in (("type-0-180", _BLUE), ("type-1-180", _ORANGE)):
         for grams, style in ((0, ":"), (20, "--"), (40, "-")):
@@ -48,37 +58,29 @@ def strokes_figure(figure: Any, race: Race) -> None:
         tca = CATALOGUE[name]
         for k, grams in enumerate((0, 10, 20, 30, 40, 50)):
             length = hanging_length(tca, hot, weight(grams))
-            axis.plot(
-                hot,
-                1e3 * length,
-                color=temperature_colour(25.0 + 26.0 * k),
-                lw=2,
-                label=f"{grams} g",
-            )
-        ends = ((tca.rest_length, "natural"), (tca.minimum_length, "coils touch"))
-        for height, word in ends:
-            axis.axhline(1e3 * height, color="#666666", lw=1, ls="--")
-            # The two lines of type 0 are close to each other.
-            below = word == "coils touch"
-            axis.text(27, 1e3 * height + (-1.0 if below else 1.0), word, fontsize=8,
-                      va="top" if below else "bottom")  # fmt: skip
+            axis.plot(hot, 1e3 * length, color=temperature_colour(25.0 + 26.0 * k), lw=2,
+                      label=f"{grams} g")  # fmt: skip
+        # Below and above: the two lines of type 0 are close to each other.
+        for height, word, gap, side in ((tca.rest_length, "natural", 1.0, "bottom"),
+                                        (tca.minimum_length, "coils touch", -1.0, "top")):
+            _limit(axis, 1e3 * height)
+            axis.text(27, 1e3 * height + gap, word, fontsize=8, va=side)
         axis.set(ylabel="length [mm]", title=f"{name}, 0 to 50 g", ylim=(45, 170))
     for axis in (a, b, c):
         axis.set(xlabel="temperature [°C]", xlim=(25, 180))
         axis.axvspan(_DATA_END, 180, color=_GREY, zorder=0)
-    for (name, moved), colour in zip(race.displacement.items(), _COLOURS, strict=False):
+    for (name, moved), colour in zip(run.displacement.items(), _COLOURS, strict=False):
         style = "--" if name.endswith("200") else "-"
-        d.plot(race.time, moved, style, color=colour, lw=2, label=name)
-    d.set(xlabel="time [s]", ylabel="displacement [mm]", xlim=(0, 2),
-          title="20 g, 1 A for 2 s")  # fmt: skip
-    a.legend(fontsize=8, frameon=False)
-    d.legend(fontsize=8, frameon=False)
+        d.plot(run.time, moved, style, color=colour, lw=2, label=name)
+    d.set(xlabel="time [s]", ylabel="displacement [mm]", xlim=(0, 2), title="20 g, 1 A for 2 s")
+    for axis in (a, d):
+        axis.legend(fontsize=8, frameon=False)
     b.legend(fontsize=8, frameon=False, ncols=2, loc="upper right")
 
 
-def creep_figure(figure: Any, found: Experiment) -> None:
+def creep_figure(figure: Any) -> None:
     """Temporary length of type 1-180; as Fig. 2.7."""
-    axis = figure.subplots()
+    axis, found = figure.subplots(), experiment()
     axis.plot(found.time, found.length, color=_BLUE, lw=2)
     l1, l2, l3, l4 = four_lengths(CATALOGUE["type-1-180"], "locked")
     for k, (value, at) in enumerate(((l1, 60), (l2, 270), (l3, 474), (l4, 690)), start=1):
@@ -97,10 +99,9 @@ def drag_figure(figure: Any) -> None:
     left, right = figure.subplots(1, 2)
     tca = CATALOGUE[drag.NAME]
     pull, way = drag.pull_of(tca), np.linspace(0.0, 0.066, 67)
-    for hot, colour in zip((130.0, drag.DATA, drag.ANNEALED, 240.0), _COLOURS, strict=False):
-        force = [pull(tca.rest_length - x, hot) for x in way]
-        left.plot(1e3 * way, force, color=colour, lw=2, label=f"{hot:.0f} °C")
-    left.axhline(drag.FRICTION, color="#666666", lw=1, ls="--")
+    _curves(left, 1e3 * way, {f"{hot:.0f} °C": [pull(tca.rest_length - x, hot) for x in way]
+                              for hot in (130.0, drag.DATA, drag.ANNEALED, 240.0)})  # fmt: skip
+    _limit(left, drag.FRICTION)
     left.text(1.0, drag.FRICTION - 0.015, "friction", fontsize=8, va="top")
     left.axvline(0.48e3 * tca.rest_length, color="#999999", lw=1, ls=":")
     left.text(0.48e3 * tca.rest_length - 0.6, 0.02, "48 %", fontsize=8, ha="right")
@@ -109,8 +110,8 @@ def drag_figure(figure: Any) -> None:
     left.legend(fontsize=8, frameon=False, loc="upper right")
     one, five = (drag.study(240.0, count) for count in (1, drag.KETTLE[1]))
     rising = one.temperature < 240.0
-    for run, style, word in ((one, "-", "one, 0.4 N, 0.4 kg"), (five, "--", "five, 2 N, 2 kg")):
-        colour = _BLUE if run is one else _ORANGE
+    for run, style, colour, word in ((one, "-", _BLUE, "one, 0.4 N, 0.4 kg"),
+                                     (five, "--", _ORANGE, "five, 2 N, 2 kg")):
         right.plot(run.temperature[rising], 1e3 * run.moved[rising], style, color=colour, lw=2,
                    label=word)  # fmt: skip
     right.axvspan(_DATA_END, 240, color=_GREY, zorder=0)
@@ -119,14 +120,14 @@ def drag_figure(figure: Any) -> None:
     right.legend(fontsize=8, frameon=False, loc="upper left")
 
 
-def sensing_figure(figure: Any, curves: Mapping[int, sensors.Curve]) -> None:
+def sensing_figure(figure: Any) -> None:
     """Resistance over length, displacement, force, and the cubic; as Figs. 2.10 to 2.12."""
-    ((a, b), (c, d)) = figure.subplots(2, 2)
-    for (grams, curve), colour in zip(curves.items(), _COLOURS, strict=True):
-        a.plot(1e3 * curve.length, curve.ohms, color=colour, lw=2, label=f"{grams} g")
-        b.plot(1e3 * curve.displacement, curve.ohms, color=colour, lw=2, label=f"{grams} g")
-    a.set(xlabel="length [mm]", title="heated at 12 V, over the length")
-    b.set(xlabel="displacement [mm]", title="the same over the displacement")
+    ((a, b), (c, d)), curves = figure.subplots(2, 2), sensors.curves()
+    for axis, way, title in ((a, "length", "heated at 12 V, over the length"),
+                             (b, "displacement", "the same over the displacement")):
+        for (grams, curve), colour in zip(curves.items(), _COLOURS, strict=True):
+            axis.plot(1e3 * getattr(curve, way), curve.ohms, color=colour, lw=2, label=f"{grams} g")
+        axis.set(xlabel=f"{way} [mm]", title=title)
     forces = weight(1.0) * np.linspace(0.0, 50.0, 101)
     c.plot(forces, sensors.stretched(forces), color=_BLUE, lw=2)
     c.set(xlabel="force [N]", xlim=(0, 0.5), title="cold: resistance (blue) and length (orange)")
@@ -155,12 +156,13 @@ def fibre_figure(figure: Any) -> None:
     hot = np.linspace(25.0, 180.0, 156)
     left.plot(hot, untwist(tca.fibre, hot), color=_BLUE, lw=2)
     left.set(ylabel="untwist [rad/m]", title="untwist of the twisted fibre")
-    for grams, colour in zip((0, 15, 30, 45, 60), _COLOURS, strict=True):
-        torsion = theories.load_torsion(tca, grams)
-        shear = 1e-9 * tca.fibre.shear * softening(tca.fibre, hot, torsion)
-        right.plot(hot, shear, color=colour, lw=2, label=f"{grams} g")
-    low = 0.87e-9 * tca.fibre.shear
-    right.axhline(low, color="#666666", lw=1, ls="--")
+    stiff = 1e-9 * tca.fibre.shear
+    _curves(right, hot, {
+        f"{grams} g": stiff * softening(tca.fibre, hot, theories.load_torsion(tca, grams))
+        for grams in (0, 15, 30, 45, 60)
+    })  # fmt: skip
+    low = 0.87 * stiff
+    _limit(right, low)
     right.text(30, low - 0.0015, "13 % less", fontsize=8, va="top")
     right.set(ylabel="shear modulus G [GPa]", title="free-stroke TCA under a weight")
     right.legend(fontsize=8, frameon=False, loc="lower left", bbox_to_anchor=(0.0, 0.02))
@@ -175,20 +177,17 @@ def statics_figure(figure: Any) -> None:
     at = theories.TEMPERATURES
     for row, (name, weights) in zip(axes, theories.CASES.items(), strict=True):
         tca = CATALOGUE[name]
-        for grams, colour in zip(weights, _COLOURS, strict=False):
-            length = hanging_length(tca, at, weight(grams))
-            row[0].plot(at, 1e3 * length, color=colour, lw=2, label=f"{grams} g")
-            cst = theories.distances(tca, grams, theories.CST)
-            path = theories.distances(tca, grams, theories.PATH)
-            row[1].plot(at, cst, color=colour, lw=2, label=f"{grams} g")
-            row[1].plot(at, path, "--", color=colour, lw=1.5)
-            love = theories.distances(tca, grams, theories.LOVE)
-            row[2].plot(at, love, color=colour, lw=2, label=f"{grams} g")
+        lengths = {f"{grams} g": 1e3 * hanging_length(tca, at, weight(grams)) for grams in weights}
+        _curves(row[0], at, lengths)
         row[0].set(ylabel="length [mm]", title=f"{name}: rod")
-        row[1].set(title=f"{name}: Castigliano")
-        row[2].set(title=f"{name}: Love")
-        for axis in row[1:]:
+        for axis, theory in zip(row[1:], (theories.CST, theories.LOVE), strict=True):
+            for grams, colour in zip(weights, _COLOURS, strict=False):
+                axis.plot(at, theories.distances(tca, grams, theory), color=colour, lw=2)
+                if theory is theories.CST:
+                    path = theories.distances(tca, grams, theories.PATH)
+                    axis.plot(at, path, "--", color=colour, lw=1.5)
             axis.set(ylim=(-25, 42), ylabel="distance from the rod [%]")
+            axis.set(title=f"{name}: {theory.name}")
             axis.axhline(0.0, color="#666666", lw=1)
         for axis in row:
             axis.set(xlabel="temperature [°C]", xlim=(25, 160))
@@ -201,13 +200,12 @@ def spring_figure(figure: Any) -> None:
     left, right = figure.subplots(1, 2)
     free = theories.crept_free_stroke(0)
     twin = left.twinx()
-    for theory, colour in ((theories.ROD, _BLUE), (theories.CST, _GREEN), (theories.LOVE, _ORANGE)):
+    for theory, colour in _SHADES.items():
         tcas = theories.lifting(0, theory)
         start = float(hanging_length(free, 25.0, 0.05, **theory.settings))  # type: ignore[arg-type]
         load = Load.spring(_SPRING, 0.05, start)
         tcas = LoadedTcas(tcas.specs, load, law=theories.law_of(tcas.specs[0], theory))
-        course = tcas.simulate(tcas.rest(), Heating(source="voltage", value=5.0), 0.02, 200,
-                               "quasistatic")  # fmt: skip
+        course = heat_up(tcas, "voltage", 5.0, 0.02, 200)
         moved = start - course.length[:, 0]
         right.plot(course.time, 1e3 * moved, color=colour, lw=2, label=theory.name)
         if theory is theories.ROD:
@@ -221,11 +219,11 @@ def spring_figure(figure: Any) -> None:
     right.legend(fontsize=8, frameon=False, loc="lower right")
 
 
-def dynamics_figure(figure: Any, lifts: Mapping[tuple[float, int], theories.Lift]) -> None:
+def dynamics_figure(figure: Any) -> None:
     """A voltage lifts a weight, three models, four cases; as Fig. 3.11."""
     panels = figure.subplot_mosaic([["0", "1", "bars"], ["2", "3", "bars"]])
-    names = (theories.ROD.name, theories.CST.name, theories.LOVE.name)
-    colours = dict(zip(names, (_BLUE, _GREEN, _ORANGE), strict=True))
+    lifts = theories.lifts(dt=0.01)
+    colours = {theory.name: colour for theory, colour in _SHADES.items()}
     top = max(float(moved.max()) for lift in lifts.values() for moved in lift.displacement.values())
     for k, ((volts, grams), lift) in enumerate(lifts.items()):
         axis = panels[str(k)]
@@ -237,9 +235,9 @@ def dynamics_figure(figure: Any, lifts: Mapping[tuple[float, int], theories.Lift
         axis.set(xlabel="time [s]", ylabel="displacement [mm]", xlim=(0, lift.time[-1]),
                  ylim=(0, 1.05 * top), title=f"{volts:g} V, {grams} g")  # fmt: skip
         known = lift.temperature <= _DATA_END
-        rod = lift.displacement[names[0]][known]
-        for j, name in enumerate(names[1:]):
-            error = 100.0 * np.abs(lift.displacement[name][known] - rod).max() / rod.max()
+        rod, *others = (lift.displacement[name][known] for name in colours)
+        for j, (name, moved) in enumerate(zip([*colours][1:], others, strict=True)):
+            error = 100.0 * np.abs(moved - rod).max() / rod.max()
             panels["bars"].bar(k + 0.36 * (j - 0.5), error, 0.34, color=colours[name],
                                label=name if k == 0 else None)  # fmt: skip
     panels["0"].legend(fontsize=8, frameon=False, loc="upper left")
@@ -249,9 +247,9 @@ def dynamics_figure(figure: Any, lifts: Mapping[tuple[float, int], theories.Lift
     panels["bars"].legend(fontsize=8, frameon=False)
 
 
-def cone_figure(figure: Any, found: theories.Cone) -> None:
+def cone_figure(figure: Any) -> None:
     """Shapes of the conical TCA, and heights over temperature; as Fig. 3.12."""
-    left, right = figure.subplots(1, 2, width_ratios=(1.5, 1.0))
+    (left, right), found = figure.subplots(1, 2, width_ratios=(1.5, 1.0)), theories.cone()
     for k, hot in enumerate((25, 55, 70, 85, 100, 115, 130)):
         shape, colour, shift = theories.heated_cone(hot), temperature_colour(hot), 27.0 * k
         x = 1e3 * (shape.position[:, 0] - shape.position[0, 0]) + shift
@@ -274,42 +272,33 @@ def cone_figure(figure: Any, found: theories.Cone) -> None:
     right.legend(loc="lower left", frameon=False, fontsize=8)
 
 
-def control_figure(
-    figure: Any,
-    integral: lifting.Response,
-    proportional: lifting.Response,
-    blown: lifting.Response,
-    answers: Mapping[int, lifting.Response],
-) -> None:
+def control_figure(figure: Any) -> None:
     """Step responses, power, and what it does with 20 and 40 g; as Figs. 2.13 and 2.14."""
     ((a, b, c), (d, e, f)) = figure.subplots(2, 3)
-    for j, (gain, colour) in enumerate(zip(lifting.INTEGRALS, _COLOURS, strict=False)):
-        a.plot(integral.time, integral.displacement[:, j], color=colour, lw=1.5,
-               label=f"$K_I$ = {gain:g}")  # fmt: skip
+    integral, proportional, blown = (lifting.over_integral(), lifting.over_proportional(),
+                                     lifting.in_blown_air())  # fmt: skip
+    for axis, run, symbol, gains in ((a, integral, "$K_I$", lifting.INTEGRALS),
+                                     (b, proportional, "$K_P$", lifting.PROPORTIONALS),
+                                     (c, blown, "$K_I$", (0.0, 0.015))):
+        names = [f"{symbol} = {gain:g}" for gain in gains]
+        _curves(axis, run.time, dict(zip(names, run.displacement.T, strict=True)), 1.5)
+        if run is proportional:
+            _curves(d, run.time, dict(zip(names, run.power.T, strict=True)), 1)
     a.set(title="20 g, $K_P$ = 10")
-    for j, (gain, colour) in enumerate(zip(lifting.PROPORTIONALS, _COLOURS, strict=False)):
-        b.plot(proportional.time, proportional.displacement[:, j], color=colour, lw=1.5,
-               label=f"$K_P$ = {gain:g}")  # fmt: skip
-        d.plot(proportional.time, proportional.power[:, j], color=colour, lw=1.0,
-               label=f"$K_P$ = {gain:g}")  # fmt: skip
     b.set(title="40 g, $K_I$ = 0.02")
-    d.set(title="power, 40 g", ylabel="power [W]", xlim=(0, 5), xlabel="time [s]")
-    for j, (gain, colour) in enumerate(((0.0, _BLUE), (0.015, _ORANGE))):
-        c.plot(blown.time, blown.displacement[:, j], color=colour, lw=1.5,
-               label=f"$K_I$ = {gain:g}")  # fmt: skip
-    c.axvspan(lifting.AIR_AT, blown.time[-1], color=_GREY, zorder=0)
     c.set(title="20 g, air is blown (grey)")
-    for (grams, response), colour in zip(answers.items(), (_BLUE, _ORANGE), strict=True):
-        ohms = lifting.hung(grams)
-        time = lifting.PERIOD * np.arange(1, len(ohms) + 1)
-        e.plot(time, lifting.felt(ohms), color=colour, lw=1.2, label=f"{grams} g")
-        f.plot(response.time, response.displacement[:, 0], color=colour, lw=1.5,
-               label=f"{grams} g")  # fmt: skip
+    c.axvspan(lifting.AIR_AT, blown.time[-1], color=_GREY, zorder=0)
+    d.set(title="power, 40 g", ylabel="power [W]", xlim=(0, 5), xlabel="time [s]")
+    felt = {f"{grams} g": lifting.felt(lifting.hung(grams)) for grams in (20, 40)}
+    _curves(e, lifting.PERIOD * np.arange(1, len(felt["20 g"]) + 1), felt, 1.2)
+    answers = {f"{grams} g": lifting.answer(grams) for grams in (20, 40)}
+    moved = {name: response.displacement[:, 0] for name, response in answers.items()}
+    _curves(f, answers["20 g"].time, moved, 1.5)
     e.set(title="cold, a weight is hung at 1 s", ylabel="sensed resistance [ohm]",
           xlabel="time [s]", xlim=(0, 4))  # fmt: skip
     f.set(title="and is lifted: twice 20 mm, or 40 mm")
     for axis in (a, b, c, f):
-        axis.axhline(lifting.GOAL, color="#666666", lw=1, ls="--")
+        _limit(axis, lifting.GOAL)
         axis.set(xlabel="time [s]", ylabel="displacement [mm]", ylim=(0, 75))
         axis.set_xlim(0, axis.get_lines()[0].get_xdata()[-1])
     a.set_ylim(0, 1.05 * float(integral.displacement.max()))

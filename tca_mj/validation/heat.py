@@ -11,19 +11,17 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tca_mj import pages
 from tca_mj.smp.convection import moving_air, radiation, still_air
-from tca_mj.tca import CATALOGUE, TcaBank, TcaMelted, TcaSpec
-from tca_mj.tca.dynamics import Heating, Load, LoadedTcas
+from tca_mj.tca import CATALOGUE, Heating, Load, LoadedTcas, TcaBank, TcaMelted, TcaSpec
 from tca_mj.tca.embedding import silicone_body
 from tca_mj.tca.thermal import BodyHeat
 from tca_mj.validation.facts import Finding, check, fitted, trend
-from tca_mj.validation.race import TYPES
+from tca_mj.validation.race import NAMES, run
 from tca_mj.validation.sensors import SENSED, crept
+from tca_mj.validation.strokes import TYPES, heat_up
 from tca_mj.validation.theories import crept_free_stroke
-
-Array = NDArray[np.float64]
 
 THREAD = 0.350  # Sun, Table 2.1 [m]
 MEASURED = (0.8, 0.080)  # voltage and current of the cold TCA of 110 mm, Sun, Section 2.3.1 [V, A]
@@ -123,15 +121,13 @@ def heated(candidate: Candidate) -> Heated:
     """All thermal facts under one candidate."""
     sensed = candidate.tca(SENSED, 0.1335)
     ohms, loss = sensed.resistance_per_length * sensed.rest_length, sensed.heat.loss
-    race, largest = _race(candidate)
+    hottest, largest = _race(candidate)
     long = candidate.tca(_COIL.of_length(0.100), 0.100 * _MADE)
     short = candidate.tca(_COIL, _COIL.rest_length * _MADE)
     acceleration, hold = _lift(candidate)
     return Heated(
-        mass=1e6 * sensed.mass,
-        current=1e3 * MEASURED[0] / ohms,
-        warming=MEASURED[0] ** 2 / ohms / float(loss),
-        race=race, largest=largest,
+        mass=1e6 * sensed.mass, current=1e3 * MEASURED[0] / ohms,
+        warming=MEASURED[0] ** 2 / ohms / float(loss), race=hottest, largest=largest,
         volts=(_lifted(candidate, 5.0), _lifted(candidate, 6.0)),
         acceleration=acceleration, hold=hold,
         pulses=tuple(pulse(long, *at) for at in PULSES),
@@ -141,16 +137,13 @@ def heated(candidate: Candidate) -> Heated:
 
 
 def _race(candidate: Candidate) -> tuple[float | None, float | None]:
-    made = {name: 1e-3 * row[2] for name, row in TYPES.items() if name != "type-0-180"}
     # One thread, one resistance (Section 2.2.2): that of the TCA of Table 2.3.
     ohms = READINGS[candidate.resistance](THREAD, 0.1335, 0.110)
-    specs = [replace(candidate.tca(CATALOGUE[name], made[name]),
+    specs = [replace(candidate.tca(CATALOGUE[name], 1e-3 * TYPES[name][2]),
                      resistance_per_length=ohms / CATALOGUE[name].rest_length)
-             for name in made]  # fmt: skip
-    tcas = LoadedTcas(specs, Load.weight(0.020))
+             for name in NAMES]  # fmt: skip
     try:
-        course = tcas.simulate(tcas.rest(), Heating(source="current", value=1.0), 0.02, 100,
-                               "quasistatic")  # fmt: skip
+        course = run(specs, 0.02)
     except ValueError:  # no modulus is left
         return None, None
     if course.temperature.max() > specs[0].fibre.melting_temperature:
@@ -160,15 +153,12 @@ def _race(candidate: Candidate) -> tuple[float | None, float | None]:
 
 
 def _lifted(candidate: Candidate, volts: float) -> float | None:
-    crept_one = crept_free_stroke(30)
-    tca = candidate.tca(crept_one, _COIL.rest_length * _MADE)
-    ohms = READINGS[candidate.resistance](_COIL.fibre_length, _COIL.rest_length * _MADE,
-                                          _COIL.rest_length)  # fmt: skip
+    natural, made = _COIL.rest_length, _COIL.rest_length * _MADE
+    ohms = READINGS[candidate.resistance](_COIL.fibre_length, made, natural)
+    tca = candidate.tca(crept_free_stroke(30), made)
     tca = replace(tca, resistance_per_length=ohms / tca.rest_length)
-    tcas = LoadedTcas([tca], Load.weight(0.030))
     try:
-        course = tcas.simulate(tcas.rest(), Heating(source="voltage", value=volts), 0.02, 200,
-                               "quasistatic")  # fmt: skip
+        course = heat_up(LoadedTcas([tca], Load.weight(0.030)), "voltage", volts, 0.02, 200)
     except ValueError:
         return None
     hot = float(course.temperature[-1, 0])
@@ -201,10 +191,9 @@ def finger_body(tca: TcaSpec) -> BodyHeat:
 def pulse(tca: TcaSpec, amperes: float, seconds: float) -> float | None:
     """Temperature after a constant current at the natural length [°C]; None if it melts."""
     bank = TcaBank([tca])
-    state, length = bank.rest(), bank.rest_length
-    power = amperes**2 * bank.resistance(state, length)
+    power = amperes**2 * bank.resistance(bank.rest(), bank.rest_length)
     try:
-        state, _ = bank.advance(state, power, length, seconds)
+        state, _ = bank.advance(bank.rest(), power, bank.rest_length, seconds)
     except TcaMelted:
         return None
     return float(state.temperature[0])
@@ -242,58 +231,51 @@ def bounds(hot: float) -> dict[str, float]:
     }
 
 
-def table(found: dict[Candidate, Heated] | None = None) -> str:
+def table() -> str:
     """The table of the candidates, as Markdown, and what it says."""
-    found = {one: heated(one) for one in candidates()} if found is None else found
-    lines = [
+    rows = [["*published*", "32", "around 80", "1 to 2", "undamaged", "60", "undamaged",
+             "up to 0.2", "", "undamaged", "undamaged", "6.6", "of 8"]]  # fmt: skip
+    for one in candidates():
+        row = heated(one)
+        star = r"\*\* " if one == IN_USE else r"\* " if one == DEFAULTS else ""
+        rows.append([
+            f"{star}{one.words}", f"{row.mass:.0f}", f"{row.current:.0f}", f"{row.warming:.1f}",
+            _hot(row.race), _hot(row.largest), ", ".join(map(_hot, row.volts)),
+            f"{row.acceleration:.2f}", f"{row.hold:.1f}", ", ".join(map(_hot, row.pulses)),
+            ", ".join(map(_hot, row.soft)), f"{row.finger:.1f}", f"{sum(row.held)}",
+        ])  # fmt: skip
+    heads = ["mass, loss, resistance, slope", "mass [mg]", "0.8 V [mA]", "warms [K]",
+             "1 A, 2 s [°C]", "moves [mm]", "5, 6 V [°C]", "12 V [m/s²]", "holds 40 mm [W]",
+             "1.5, 2.5 A bare [°C]", "in silicone [°C]", "finger [ohm]", "held"]  # fmt: skip
+    (cylinder, thread, draught), (hot_cylinder, hot_thread, hot_draught) = (
+        [1e3 * taken for taken in bounds(hot).values()] for hot in (27.0, 160.0)
+    )
+    return "\n".join([
         "Every thermal fact under every reading. *Mass*: weighed (32 mg per TCA, 117 mg/m), or"
         " computed, 1300 kg/m³ on the circle of 0.21 mm. *Loss*: h c_s = 23 x 2.5 W/(m² K) on"
         " thread of 0.17 or 0.21 mm radius, or 32, 56 and 64 mW/K of 350 mm. *Resistance*: what"
         " 6.7 ohm/dm are counted on, or 10 ohm per 350 mm of thread. *Slope*: how much it rises"
         " over the free stroke. A dash is a fibre that melts. Stars: in use, ** for the TCAs of"
         " Chapter 2, * by default.",
-        "",
-        "| mass, loss, resistance, slope | mass [mg] | 0.8 V [mA] | warms [K] | 1 A, 2 s [°C]"
-        " | moves [mm] | 5, 6 V [°C] | 12 V [m/s²] | holds 40 mm [W] | 1.5, 2.5 A bare [°C]"
-        " | in silicone [°C] | finger [ohm] | held |",
-        "|---" * 13 + "|",
-        "| *published* | 32 | around 80 | 1 to 2 | undamaged | 60 | undamaged | up to 0.2 | "
-        "| undamaged | undamaged | 6.6 | of 8 |",
-    ]
-    for one, row in found.items():
-        star = "** " if one == IN_USE else "* " if one == DEFAULTS else ""
-        star = star.replace("*", r"\*")
-        lines.append(
-            f"| {star}{one.words} | {row.mass:.0f} | {row.current:.0f} | {row.warming:.1f}"
-            f" | {_hot(row.race)}"
-            f" | {_hot(row.largest)} | {', '.join(map(_hot, row.volts))} | {row.acceleration:.2f}"
-            f" | {row.hold:.1f} | {', '.join(map(_hot, row.pulses))}"
-            f" | {', '.join(map(_hot, row.soft))} | {row.finger:.1f} | {sum(row.held)} |"
-        )
-    cold, hot = bounds(27.0), bounds(160.0)
-    lines += [
-        "",
+        "", *pages.table(heads, rows), "",
         "Air takes, per metre of thread and kelvin (27 and 160 °C): from the coil's outer cylinder"
-        f" {1e3 * cold['outer cylinder']:.0f} and {1e3 * hot['outer cylinder']:.0f} mW, from a"
-        f" single thread {1e3 * cold['single thread']:.0f} and {1e3 * hot['single thread']:.0f} mW,"
-        f" in a draught of 0.4 m/s {1e3 * cold['in a draught']:.0f} and"
-        f" {1e3 * hot['in a draught']:.0f} mW. By default a TCA loses"
-        f" {1e3 * LOSSES['0.21']:.0f} mW, those of Chapter 2 {1e3 * LOSSES['56 mW/K']:.0f}.",
+        f" {cylinder:.0f} and {hot_cylinder:.0f} mW, from a single thread {thread:.0f} and"
+        f" {hot_thread:.0f} mW, in a draught of 0.4 m/s {draught:.0f} and {hot_draught:.0f} mW. By"
+        f" default a TCA loses {1e3 * LOSSES['0.21']:.0f} mW, those of Chapter 2"
+        f" {1e3 * LOSSES['56 mW/K']:.0f}.",
         "",
         "No reading holds everything, because Chapters 2 and 4 contradict each other: around 80 mA"
         " need a resistance at which 2.5 A melt a bare TCA, and the finger has less. So each"
         " chapter keeps what was measured in it. TCAs of Chapter 2 have the made length's"
-        " resistance, and the loss that 60 mm need; with it the camera's 1 to 2 °C and the"
-        " steady errors of the controller follow, which nothing was fitted to. All others have the"
-        " natural length's resistance (finger, pulses of Section 4.3.4) and the identified loss,"
-        " which lies between"
-        " what still air takes from an outer cylinder and from a single thread; most of them lie in"
-        " silicone, where that loss does not count. The mass is the weighed one: the computed one"
-        " slows the start at 12 V, and is twice what the scales say. What 5 and 6 V did to the"
-        " free-stroke TCA decides nothing: with the identified loss only the thread's length"
-        " survives it, and that contradicts every other resistance.",
-    ]
-    return "\n".join(lines)
+        " resistance, and the loss that 60 mm need; with it the camera's 1 to 2 °C and the steady"
+        " errors of the controller follow, which nothing was fitted to. All others have the natural"
+        " length's resistance (finger, pulses of Section 4.3.4) and the identified loss, which lies"
+        " between what still air takes from an outer cylinder and from a single thread; most of"
+        " them lie in silicone, where that loss does not count. The mass is the weighed one: the"
+        " computed one slows the start at 12 V, and is twice what the scales say. What 5 and 6 V"
+        " did to the free-stroke TCA decides nothing: with the identified loss only the thread's"
+        " length survives it, and that contradicts every other resistance.",
+    ])  # fmt: skip
 
 
 def _hot(value: float | None) -> str:

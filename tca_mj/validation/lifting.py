@@ -8,20 +8,19 @@ and the length of the filter.
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from tca_mj.checks import Array, floats
 from tca_mj.control import PiSpec, pi_rest, pi_step
-from tca_mj.tca import TcaSpec, resistance
-from tca_mj.tca.dynamics import Heating, Load, LoadedTcas, LoadState
-from tca_mj.tca.sensing import fit_displacement, resistance_displacement
-from tca_mj.tca.sensor import measured, moving_average, pulse_power
+from tca_mj.tca import Heating, Load, LoadedTcas, LoadState, TcaSpec, resistance
+from tca_mj.tca.sensing.sensor import measured, moving_average, pulse_power
+from tca_mj.tca.sensing.wire import fit_displacement, resistance_displacement
 from tca_mj.validation.facts import Finding, fitted, not_covered, trend
 from tca_mj.validation.sensors import SENSED, WIRE, crept
 from tca_mj.validation.strokes import DEVIATION, weight
-
-Array = NDArray[np.float64]
 
 SUPPLY = 12.0  # Sun, Section 2.3.2 [V]
 SENSING = 0.8  # voltage when only sensing, Sun, Section 2.3.1 [V]
@@ -64,11 +63,9 @@ class Response:
     @property
     def swings(self) -> NDArray[np.int_]:
         """How often it is off the goal by more than ``DEVIATION`` to the other side, shape (m,)."""
-        counts = []
-        for column in self.displacement.T:
-            side = np.sign(column - GOAL)[np.abs(column - GOAL) > DEVIATION]
-            counts.append(int(np.count_nonzero(np.diff(side))))
-        return np.array(counts)
+        off = (self.displacement - GOAL).T
+        sides = (np.sign(column[np.abs(column) > DEVIATION]) for column in off)
+        return np.array([np.count_nonzero(np.diff(side)) for side in sides])
 
     def rise(self, share: float = 0.8) -> Array:
         """Time at which a share of the goal is reached, shape (m,) [s]."""
@@ -77,12 +74,9 @@ class Response:
 
 def controller(proportional: ArrayLike, integral: ArrayLike) -> PiSpec:
     """The controller: K_P as printed, per mm; K_I as printed, per mm and sample."""
-    return PiSpec(
-        proportional=np.asarray(proportional, dtype=np.float64)[:, None],
-        integral=np.asarray(integral, dtype=np.float64)[:, None] / PERIOD,
-        lowest=_LEAST * FULL,
-        highest=FULL,
-    )
+    per_error, per_sample = (floats("gain", gain)[:, None] for gain in (proportional, integral))
+    return PiSpec(proportional=per_error, integral=per_sample / PERIOD,
+                  lowest=_LEAST * FULL, highest=FULL)  # fmt: skip
 
 
 def lift(
@@ -134,11 +128,8 @@ def lift(
         power = pulse_power(SUPPLY, duty, now)
         heating = Heating(value=power, air=air(k * PERIOD))
         state = tcas.step(state, heating, PERIOD, "quasistatic")
-        record[:, k] = (
-            1e3 * (start - state.length[:, 0]), power[:, 0], state.temperature[:, 0]
-        )  # fmt: skip
-    time = PERIOD * np.arange(1.0, steps + 1.0)
-    return Response(time, record[0], record[1], record[2])
+        record[:, k] = 1e3 * (start - state.length[:, 0]), power[:, 0], state.temperature[:, 0]
+    return Response(PERIOD * np.arange(1.0, steps + 1.0), *record)
 
 
 INTEGRALS = (0.0, 0.01, 0.015, _RINGING)
@@ -146,16 +137,19 @@ PROPORTIONALS = (5.0, 10.0, 20.0)
 AIR_AT = 15.0  # when the air is blown, an estimate [s]
 
 
+@cache
 def over_integral() -> Response:
     """20 g, K_P = 10, the K_I of ``INTEGRALS``."""
     return lift(20, controller(np.full(4, 10.0), INTEGRALS))
 
 
+@cache
 def over_proportional() -> Response:
     """40 g, K_I = 0.02, the K_P of ``PROPORTIONALS``."""
     return lift(40, controller(PROPORTIONALS, np.full(3, 0.02)))
 
 
+@cache
 def in_blown_air() -> Response:
     """20 g, K_P = 10, without K_I and with 0.015; air is blown from ``AIR_AT`` on."""
     return lift(20, controller([10.0, 10.0], [0.0, 0.015]), duration=30.0,
@@ -191,18 +185,19 @@ def _fall(grams: float) -> float:
     return float(WIRE.rest_resistance[0] - resistance(WIRE, tcas.rest().length, 25.0)[0])
 
 
-def answer(grams: int, seed: int = 0) -> Response:
+@cache
+def answer(grams: int) -> Response:
     """What it does once it has felt a weight: 20 mm, 2 s, 20 mm more; or 40 mm."""
 
     def goal(time: float) -> float:
         return 20.0 if grams == 20 and time < _HOLD else 40.0
 
-    return lift(grams, controller([10.0], [0.1]), tca=SENSED, goal=goal, duration=2.0 * _HOLD,
-                seed=seed)  # fmt: skip
+    return lift(grams, controller([10.0], [0.1]), tca=SENSED, goal=goal, duration=2.0 * _HOLD)
 
 
-def steps(integral: Response, proportional: Response, blown: Response) -> list[Finding]:
-    """Step responses of ``over_integral``, ``over_proportional``, ``in_blown_air``."""
+def steps() -> list[Finding]:
+    """Step responses."""
+    integral, proportional, blown = over_integral(), over_proportional(), in_blown_air()
     error = 100.0 * (1.0 - integral.steady / GOAL)
     late = 100.0 * (1.0 - proportional.steady / GOAL)
     rise = proportional.rise()
@@ -238,8 +233,7 @@ def steps(integral: Response, proportional: Response, blown: Response) -> list[F
               bool(np.all(np.diff(rise) < 0.0)),
               note="Until 28 mm the voltage is on all the time at K_P = 10 and 20. The last tenth"
               " is the integral's, and takes longer at 10 than at 5. At K_P = 10 an error of"
-              f" {late[1]:.1f} % is left after 10 to 15 s (below 5 %"
-              " reported)."),
+              f" {late[1]:.1f} % is left after 10 to 15 s (below 5 % reported)."),
         fitted(_SOURCE, "40 g, K_P = 20: overshoot", "overshoots",
                f"by {over[2]:.0f} %; at K_P = 10 by {max(over[1], 0.0):.0f} %",
                f"the {FILTER} samples of the filter; with 10 of them nothing overshoots.",
@@ -252,17 +246,14 @@ def steps(integral: Response, proportional: Response, blown: Response) -> list[F
     ]  # fmt: skip
 
 
-def demonstration(twice: Response, once: Response, runs: int = 20) -> list[Finding]:
-    """Feels 20 or 40 g and lifts it accordingly: ``answer(20)`` and ``answer(40)``."""
-    right = 0
-    for grams in (20, 40):
-        ohms = hung(grams)
-        right += sum(recognised(felt(ohms, seed)) == grams for seed in range(runs))
-    held = twice.time < _HOLD
-    reached = (
-        float(twice.displacement[held][-200:].mean()), float(twice.displacement[-200:].mean()),
-        float(once.displacement[-200:].mean()),
-    )  # fmt: skip
+def demonstration(runs: int = 20) -> list[Finding]:
+    """Feels 20 or 40 g and lifts it accordingly."""
+    twice, once = answer(20), answer(40)
+    true = {grams: hung(grams) for grams in (20, 40)}
+    right = sum(recognised(felt(ohms, seed)) == grams
+                for grams, ohms in true.items() for seed in range(runs))  # fmt: skip
+    courses = twice.displacement[twice.time < _HOLD], twice.displacement, once.displacement
+    reached = [float(course[-200:].mean()) for course in courses]
     return [
         trend("Section 2.3.2", "feels 20 or 40 g by its resistance", "it does, 20 g not always",
               "right in every run", f"{right} of {2 * runs} runs", right == 2 * runs,

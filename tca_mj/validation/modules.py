@@ -9,7 +9,6 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tca_mj.modules.bending import BendingSpec
 from tca_mj.modules.finger import FingerPairSpec, finger_pair
@@ -22,8 +21,6 @@ from tca_mj.tca.embedding import silicone_body
 from tca_mj.validation.attitude import JUDGED, bent, contact_for, in_free_air
 from tca_mj.validation.facts import Finding, check, fitted, trend
 from tca_mj.validation.replay import PRINTED, Course, Powers, loaded_arm
-
-Array = NDArray[np.float64]
 
 DEVIATION = 4.49  # largest standard deviation of Fig. 4.4d [deg]
 INITIAL = 10.0  # largest error at the start, Section 4.1.3 [deg]

@@ -6,21 +6,20 @@ estimates. Nothing is grasped here: the object is a mass that hangs between the 
 """
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
+from itertools import groupby
 from types import MappingProxyType
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
 from tca_mj.agents.scripted import PickAndPlace
+from tca_mj.checks import Array
 from tca_mj.envs.arm import ArmPickPlace
 from tca_mj.robots.arm import ArmSpec, arm
 from tca_mj.sim import Simulation
 from tca_mj.validation.attitude import by_place
-
-Array = NDArray[np.float64]
 
 OBJECT = 1e-3  # mass of a screwdriver or a PCB that the arm lifts: an estimate [kg]
 PERIOD = 0.1  # between two samples [s]
@@ -50,12 +49,10 @@ class Powers:
 
 
 # Sun, Section 4.1.4 and Fig. 4.6.
-PRINTED: Mapping[str, Powers] = MappingProxyType(
-    {
-        "screwdriver": Powers(14.0, 10.0, (0.6, 0.6), 45.0),
-        "pcb": Powers(16.0, 8.0, (0.2, 0.8), 58.0),
-    }
-)
+PRINTED: Mapping[str, Powers] = MappingProxyType({
+    "screwdriver": Powers(14.0, 10.0, (0.6, 0.6), 45.0),
+    "pcb": Powers(16.0, 8.0, (0.2, 0.8), 58.0),
+})  # fmt: skip
 
 
 @dataclass(slots=True)
@@ -110,12 +107,11 @@ class Course:
 
     def phases(self) -> list[tuple[str, slice]]:
         """The phases in their order, each with its samples."""
-        found: list[tuple[str, slice]] = []
-        for i, name in enumerate(self.phase):
-            if found and found[-1][0] == name:
-                found[-1] = name, slice(found[-1][1].start, i + 1)
-            else:
-                found.append((name, slice(i, i + 1)))
+        found, start = [], 0
+        for name, samples in groupby(self.phase):
+            stop = start + len(list(samples))
+            found.append((name, slice(start, stop)))
+            start = stop
         return found
 
 
@@ -159,28 +155,21 @@ def replay(powers: Powers) -> Course:
     sim.data.time = 0.0
     course.sample(sim, "rotate")
 
-    def go(
-        name: str, power: list[float], time: float, until: Callable[[], bool] | None = None
-    ) -> None:
-        for _ in range(round(time / PERIOD)):
+    bend = [*powers.bend, 0.0]
+    plan = (
+        ("rotate", [0.0, 0.0, 0.0, powers.wrist, 0.0], HEATING),
+        ("open", [0.0, 0.0, 0.0, 0.0, powers.gripper], HEATING),
+        ("close", [0.0] * 5, CLOSING), ("lift", [0.0] * 5, LIFTING),
+        ("bend", [*bend, 0.0, 0.0], LONGEST), ("release", [*bend, 0.0, powers.gripper], HEATING),
+    )  # fmt: skip
+    for name, power, time in plan:
+        sim.data.ctrl[0] = _SPEED if name == "lift" else 0.0
+        for k in range(round(time / PERIOD)):
             sim.step(np.array(power), PERIOD)
             course.sample(sim, name)
-            if until is not None and until():
-                return
-
-    def still() -> bool:
-        since = sum(name == "bend" for name in course.phase)
-        return since > 40 and abs(course.bend[-1] - course.bend[-21]) < _STILL
-
-    bend = [*powers.bend, 0.0]
-    go("rotate", [0.0, 0.0, 0.0, powers.wrist, 0.0], HEATING)
-    go("open", [0.0, 0.0, 0.0, 0.0, powers.gripper], HEATING)
-    go("close", [0.0] * 5, CLOSING)
-    sim.data.ctrl[0] = _SPEED
-    go("lift", [0.0] * 5, LIFTING)
-    sim.data.ctrl[0] = 0.0
-    go("bend", [*bend, 0.0, 0.0], LONGEST, still)
-    go("release", [*bend, 0.0, powers.gripper], HEATING)
+            moved = course.bend[-1] - course.bend[-21] if k >= 40 else np.inf
+            if name == "bend" and abs(moved) < _STILL:
+                break
     return course
 
 

@@ -3,18 +3,14 @@
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from tca_mj.tca import TcaSpec, WireTable, hanging_length, resistance
+from tca_mj.checks import Array
+from tca_mj.tca import Load, LoadedTcas, TcaSpec, WireTable, hanging_length, resistance
 from tca_mj.tca.catalogue import MODULE_TCAS
-from tca_mj.tca.creep import CreepBank, CreepState
-from tca_mj.tca.dynamics import Heating, Load, LoadedTcas
-from tca_mj.tca.sensing import DisplacementFit, fit_displacement, resistance_displacement
-from tca_mj.tca.sensor import measured
+from tca_mj.tca.sensing.sensor import measured
+from tca_mj.tca.sensing.wire import DisplacementFit, fit_displacement, resistance_displacement
 from tca_mj.validation.facts import Finding, check, fitted, trend
-from tca_mj.validation.strokes import weight
-
-Array = NDArray[np.float64]
+from tca_mj.validation.strokes import heat_up, settled, weight
 
 SENSED = MODULE_TCAS["sensing"]
 WIRE = WireTable.of([SENSED])
@@ -26,8 +22,7 @@ _LOOK = "Section 2.3.1"
 
 def crept(grams: float) -> TcaSpec:
     """The TCA after the heating cycle that comes before every experiment with a new weight."""
-    bank = CreepBank([SENSED])
-    return bank.crept(CreepState(bank.settled([weight(grams)])))[0]
+    return settled(SENSED, grams)
 
 
 class Curve(NamedTuple):
@@ -47,8 +42,7 @@ def lifted(grams: float, volts: float, duration: float = 2.0) -> Curve:
         return resistance_displacement(WIRE, start - length, weight(grams), temperature)
 
     tcas = LoadedTcas([tca], Load.weight(1e-3 * grams), resistance=ohms)
-    heating = Heating(source="voltage", value=volts)
-    course = tcas.simulate(tcas.rest(), heating, 0.01, round(100 * duration), "quasistatic")
+    course = heat_up(tcas, "voltage", volts, 0.01, round(100 * duration))
     moved = start - course.length[:, 0]
     kept = moved <= 0.045
     length = course.length[kept]
@@ -73,7 +67,7 @@ def cubic(curve: Curve, seed: int) -> tuple[DisplacementFit, Array]:
 
 def characterisation(found: dict[int, Curve]) -> list[Finding]:
     """Facts about the ``curves()``."""
-    ohms = stretched_by(np.array([0.0, 0.055]))
+    ohms = resistance(WIRE, SENSED.rest_length + np.array([[0.0], [0.055]]), 25.0)[:, 0]
     falls = stretched(weight(1.0) * np.linspace(0.0, 50.0, 26))
     rising = all(bool(np.all(np.diff(curve.ohms) > 0.0)) for curve in found.values())
     both = [*found.values(), *(lifted(grams, VOLTS[1], 1.5) for grams in (WEIGHTS[0], WEIGHTS[-1]))]
@@ -98,28 +92,21 @@ def characterisation(found: dict[int, Curve]) -> list[Finding]:
     ]  # fmt: skip
 
 
-def stretched_by(amount: Array) -> Array:
-    """Resistance of the cold TCA that is pulled longer, shape (k,) [m] -> [ohm]."""
-    return resistance(WIRE, SENSED.rest_length + amount[:, None], 25.0)[:, 0]
-
-
 def polynomial(found: dict[int, Curve]) -> list[Finding]:
     """Error of the third-order polynomial D(R) of the ``curves()``."""
-    rows = []
-    rmse = {}
-    for grams in (20, 40):
-        errors = [cubic(found[grams], seed)[0].rmse for seed in range(_RUNS)]
-        rmse[grams] = 1e3 * float(np.mean(errors))
-    source = "Section 2.3.2"
-    rows.append(fitted(source, "error of the cubic D(R), 20 g", "0.22 mm", f"{rmse[20]:.2f} mm",
-                       "`CurrentSensor.noise`.", value=rmse[20]))  # fmt: skip
-    rows.append(check(
-        source, "error of the cubic D(R), 40 g", "0.35 mm", rmse[40], 0.30, 0.40, "mm", digits=2,
-        reason="The noise of the sensor is the only source of error here, and it is that of 20 g:"
-        " the law is a straight line, which the cubic follows exactly. What makes 40 g worse is"
-        " not reported; 1.6 times the noise would do.",
-    ))  # fmt: skip
-    return rows
+    light, heavy = (
+        1e3 * float(np.mean([cubic(found[grams], seed)[0].rmse for seed in range(_RUNS)]))
+        for grams in (20, 40)
+    )
+    return [
+        fitted("Section 2.3.2", "error of the cubic D(R), 20 g", "0.22 mm", f"{light:.2f} mm",
+               "`CurrentSensor.noise`.", value=light),
+        check("Section 2.3.2", "error of the cubic D(R), 40 g", "0.35 mm", heavy, 0.30, 0.40, "mm",
+              digits=2,
+              reason="The noise of the sensor is the only source of error here, and it is that of"
+              " 20 g: the law is a straight line, which the cubic follows exactly. What makes 40 g"
+              " worse is not reported; 1.6 times the noise would do."),
+    ]  # fmt: skip
 
 
 def findings() -> list[Finding]:

@@ -6,18 +6,17 @@
 import math
 from dataclasses import dataclass, replace
 from itertools import product
-from typing import Literal, NamedTuple
+from typing import Literal, NamedTuple, get_args
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-from tca_mj.tca import CATALOGUE, FibreSpec, TcaSpec, hanging_length
-from tca_mj.tca.creep import CreepBank, CreepState
-from tca_mj.tca.dynamics import GRAVITY
+from tca_mj.checks import Array
+from tca_mj.tca import CATALOGUE, FibreSpec, LoadedTcas, TcaSpec, hanging_length
+from tca_mj.tca.dynamics.loads import GRAVITY, Course, Heating
+from tca_mj.tca.laws.creep import CreepBank, CreepState
 from tca_mj.validation.facts import Finding, check, fitted, not_covered, trend
 
-Array = NDArray[np.float64]
 Ends = Literal["free", "locked"]
 
 # Sun, Table 2.1: groove [°], annealing [°C], made length, natural length [mm], free stroke [%].
@@ -50,27 +49,42 @@ def contraction(tca: TcaSpec, grams: float, hot: float, ends: Ends = "free") -> 
     return 1e3 * float(cold - warm)
 
 
+def settled(tca: TcaSpec, grams: float) -> TcaSpec:
+    """A TCA once it has crept under a weight."""
+    bank = CreepBank([tca])
+    return bank.crept(CreepState(bank.settled([weight(grams)])))[0]
+
+
+def heat_up(
+    tcas: LoadedTcas, source: Literal["voltage", "current"], value: float, dt: float, steps: int
+) -> Course:
+    """TCAs under their loads from rest, heated steadily and without inertia.
+
+    Args:
+        tcas: The TCAs and their loads.
+        source: What is constant.
+        value: How much it is [V, A].
+        dt: Length of a step [s].
+        steps: Number of steps.
+    """
+    heating = Heating(source=source, value=value)
+    return tcas.simulate(tcas.rest(), heating, dt, steps, "quasistatic")
+
+
 def free_strokes() -> list[Finding]:
     """Free strokes of Table 2.1 from the catalogue, and from fibre and mandrel."""
     contact = 1e3 * CATALOGUE["type-2-180"].minimum_length
-    rows = [
-        check("Table 2.1", "length at which coils touch", "about 70 mm", contact, 69.5, 70.5, "mm",
-              note="350 mm of thread at the groove of type 0, 11.53°.")
-    ]  # fmt: skip
+    rows = [check("Table 2.1", "length at which coils touch", "about 70 mm", contact, 69.5, 70.5,
+                  "mm", note="350 mm of thread at the groove of type 0, 11.53°.")]  # fmt: skip
     for name, (*_, printed) in TYPES.items():
         stroke = 100.0 * CATALOGUE[name].free_stroke
-        if name == "type-0-180":
-            rows.append(fitted(
-                "Table 2.1", f"free stroke of {name}, catalogue", f"{printed} %", f"{stroke:.1f} %",
-                "the contact length of type 0 follows from this number: its natural length, 61 mm,"
-                " is below its made length, 70 mm, at which its coils touch already.",
-                value=stroke,
-            ))  # fmt: skip
-        else:
-            rows.append(check(
-                "Table 2.1", f"free stroke of {name}, catalogue", f"{printed} %", stroke,
-                printed - _POINTS, printed + _POINTS, "%",
-            ))  # fmt: skip
+        about = "Table 2.1", f"free stroke of {name}, catalogue", f"{printed} %"
+        rows.append(fitted(
+            *about, f"{stroke:.1f} %",
+            "the contact length of type 0 follows from this number: its natural length, 61 mm,"
+            " is below its made length, 70 mm, at which its coils touch already.", value=stroke,
+        ) if name == "type-0-180" else check(
+            *about, stroke, printed - _POINTS, printed + _POINTS, "%"))  # fmt: skip
     return rows + from_mandrels()
 
 
@@ -82,15 +96,12 @@ def made_from_mandrel(name: str) -> TcaSpec:
     """
     _, annealed, made, *_ = TYPES[name]
     if name == "type-0-180":
-        raise ValueError(f"{name} is coiled without a groove")
+        raise ValueError(f"name must be a type coiled in a groove, got {name!r}")
     return TcaSpec.from_mandrel(
-        fibre=replace(CATALOGUE[name].fibre, radius=THICKNESS / 2.0),
-        fibre_length=0.350,
-        core_diameter=0.405e-3,
-        groove_pitch_angle=math.asin(made / 350.0),
-        annealing_temperature=annealed,
-        minimum_pitch_angle=math.radians(11.53),
-    )
+        fibre=replace(CATALOGUE[name].fibre, radius=THICKNESS / 2.0), fibre_length=0.350,
+        core_diameter=0.405e-3, groove_pitch_angle=math.asin(made / 350.0),
+        annealing_temperature=annealed, minimum_pitch_angle=math.radians(11.53),
+    )  # fmt: skip
 
 
 def from_mandrels() -> list[Finding]:
@@ -144,22 +155,21 @@ class Choice(NamedTuple):
     """One set of what the source leaves open."""
 
     radius: float  # of the thread [m]
-    section: Section
-    ends: Ends
-    reference: Reference
-    softened: bool  # by the load
+    section: Section = "cold"
+    ends: Ends = "free"
+    reference: Reference = "natural"
+    softened: bool = False  # by the load
     untwist: float = 1.0  # factor
     moduli: float = 1.0  # factor
 
     def tca(self, name: str) -> TcaSpec:
         """A type of the catalogue under this choice, without creep."""
         tca = CATALOGUE[name]
-        fibre = replace(
+        return replace(tca, fibre=replace(
             tca.fibre, radius=self.radius, section=self.section, untwist_scale=self.untwist,
             young=self.moduli * tca.fibre.young, shear=self.moduli * tca.fibre.shear,
             load_softening=_LOADED if self.softened else (0.0, 0.0, 1.0),
-        )  # fmt: skip
-        return replace(tca, fibre=fibre)
+        ))  # fmt: skip
 
     def contractions(self) -> Array:
         """The four contractions of ``CONTRACTIONS`` [mm], NaN where no modulus is left."""
@@ -168,8 +178,7 @@ class Choice(NamedTuple):
             tca = self.tca(name)
             try:
                 if self.reference == "crept" and grams:
-                    bank = CreepBank([tca])
-                    (tca,) = bank.crept(CreepState(bank.settled([weight(grams)])))
+                    tca = settled(tca, grams)
                 values.append(contraction(tca, grams, 150.0, self.ends))
             except ValueError:
                 values.append(math.nan)
@@ -187,9 +196,6 @@ class Choice(NamedTuple):
 
 
 _LOADED = CATALOGUE["free-stroke"].fibre.load_softening
-_SECTIONS: tuple[Section, ...] = ("cold", "hot")
-_ENDS: tuple[Ends, ...] = ("free", "locked")
-_REFERENCES: tuple[Reference, ...] = ("natural", "crept")
 _RADII = (THICKNESS / 2.0, FibreSpec().radius)  # Tables 2.1 and 3.1
 
 
@@ -221,21 +227,17 @@ class Scan:
 
 def scan_of_choices() -> Scan:
     """All sets of published constants: 2 radii, sections, ends, references, softening or not."""
-    choices = [
-        Choice(radius, section, ends, reference, softened)
-        for radius, section, ends, reference, softened in product(
-            _RADII, _SECTIONS, _ENDS, _REFERENCES, (False, True))
-    ]  # fmt: skip
-    return Scan.of(choices)
+    kinds = get_args(Section), get_args(Ends), get_args(Reference)
+    return Scan.of([Choice(*each) for each in product(_RADII, *kinds, (False, True))])
 
 
 def scan_of_factors() -> Scan:
     """The sets without creep and softening, with untwist and moduli scaled to fit."""
     untwist, moduli = np.arange(0.8, 2.7, 0.2), (0.7, 1.0, 1.5, 2.0, 2.5, 3.0, 4.0)
+    kinds = product(_RADII, get_args(Section), get_args(Ends), untwist, moduli)
     return Scan.of([
-        Choice(radius, section, ends, "natural", False, round(float(u), 2), m)
-        for radius, section, ends, u, m in product(
-            _RADII, _SECTIONS, _ENDS, untwist, moduli)
+        Choice(radius, section, ends, untwist=round(float(u), 2), moduli=m)
+        for radius, section, ends, u, m in kinds
     ])  # fmt: skip
 
 
@@ -247,31 +249,31 @@ def loaded_contractions(scan: Scan | None = None, factors: Scan | None = None) -
         factors: ``scan_of_factors()``; None to say nothing of it.
     """
     between = _stroke_difference()
-    theory = (
+    reason = (
         "The two types differ by 20 mm in print. In the model type 1 stretches"
         f" {-between:.1f} mm less than type 0 under 40 g when cold, and its free stroke is 14.5 mm"
         f" longer: with the coils of both touching they differ by {14.5 + between:.0f} mm, and by"
         " no more than 14.5 mm however stiff the thread; with neither touching by a few mm, at"
         " first the other way round. No choice of thread holds both (the table of threads)."
     )
-    tried = "" if scan is None or factors is None else " " + _said(scan, factors)
-    rows = []
-    for name in STOPS:
-        printed, value = CONTRACTIONS[name, 40], contraction(CATALOGUE[name], 40, 150.0)
-        rows.append(check(
-            "Section 2.2.1", f"{name}, 40 g, to 150 °C", f"{printed:g} mm", value,
-            printed - DEVIATION, printed + DEVIATION, "mm", reason=theory + tried,
-        ))  # fmt: skip
-    return rows
+    if scan is not None and factors is not None:
+        reason += " " + _said(scan, factors)
+    printed = {name: CONTRACTIONS[name, 40] for name in STOPS}
+    return [
+        check("Section 2.2.1", f"{name}, 40 g, to 150 °C", f"{mm:g} mm",
+              contraction(CATALOGUE[name], 40, 150.0), mm - DEVIATION, mm + DEVIATION, "mm",
+              reason=reason)
+        for name, mm in printed.items()
+    ]  # fmt: skip
 
 
 def _stroke_difference() -> float:
     """Cold stretch of type 1-180 under 40 g less that of type 0-180 [mm]."""
-    stretch = [
+    one, none = (
         1e3 * float(hanging_length(CATALOGUE[name], 25.0, weight(40)) - CATALOGUE[name].rest_length)
         for name in ("type-1-180", "type-0-180")
-    ]
-    return stretch[0] - stretch[1]
+    )
+    return one - none
 
 
 def _said(scan: Scan, factors: Scan) -> str:
@@ -330,20 +332,11 @@ def overlaps(tca: TcaSpec) -> tuple[float, float]:
 
 def overlap() -> list[Finding]:
     """Below 70 °C the curves of 0, 20 and 40 g nearly overlap."""
-    rows = []
-    for name in STOPS:
-        early, late = overlaps(CATALOGUE[name])
-        rows.append(trend(
-            "Section 2.2.1", f"{name}, 0, 20 and 40 g below 70 °C", "curves almost overlap",
-            f"each within {DEVIATION} mm of their mean", f"{early:.1f} mm ({late:.1f} at 150 °C)",
-            early <= DEVIATION, value=early,
-            reason="Without load the coils touch before 70 °C.",
-        ))  # fmt: skip
-    return rows
-
-
-def findings(full: bool = True) -> list[Finding]:
-    """All of this file; ``full`` adds the scans, which take some seconds."""
-    scans = (scan_of_choices(), scan_of_factors()) if full else (None, None)
-    return [*free_strokes(), *contact_stops(), *loaded_contractions(*scans), *loaded_stroke(),
-            *overlap()]  # fmt: skip
+    found = {name: overlaps(CATALOGUE[name]) for name in STOPS}
+    return [
+        trend("Section 2.2.1", f"{name}, 0, 20 and 40 g below 70 °C", "curves almost overlap",
+              f"each within {DEVIATION} mm of their mean", f"{early:.1f} mm ({late:.1f} at 150 °C)",
+              early <= DEVIATION, value=early,
+              reason="Without load the coils touch before 70 °C.")
+        for name, (early, late) in found.items()
+    ]  # fmt: skip

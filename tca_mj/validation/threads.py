@@ -6,57 +6,30 @@ the thread is 0.34 mm thick. The moduli on the thickness give a second thread wh
 2.3 times smaller. This file compares both, and the free factor on the untwist.
 """
 
-from collections.abc import Iterable
-from dataclasses import replace
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import NamedTuple
 
-from tca_mj.tca import CATALOGUE, TcaSpec, hanging_length, tension
-from tca_mj.tca.dynamics import Heating, Load, LoadedTcas
+from tca_mj import pages
+from tca_mj.tca import CATALOGUE, hanging_length, tension
+from tca_mj.validation import strokes
 from tca_mj.validation.creeping import four_lengths
 from tca_mj.validation.drag import ANNEALED, FRICTION
-from tca_mj.validation.strokes import (
-    CONTRACTIONS,
-    DEVIATION,
-    STOPS,
-    THICKNESS,
-    TYPES,
-    Section,
-    contraction,
-    overlaps,
-    weight,
-)
+from tca_mj.validation.race import NAMES, run
+from tca_mj.validation.strokes import CONTRACTIONS, DEVIATION, STOPS, THICKNESS, Choice, overlaps
 
-_SOFTENED = CATALOGUE["free-stroke"].fibre.load_softening
-
-
-class Thread(NamedTuple):
-    """A thread of Chapter 2."""
-
-    words: str
-    radius: float  # that its moduli are taken on [m]
-    softened: bool  # by the load, as in Chapter 3
-    section: Section = "cold"
-    untwist: float = 1.0  # factor
-
-    def tca(self, name: str) -> TcaSpec:
-        """A type of the catalogue on this thread."""
-        tca = CATALOGUE[name]
-        return replace(tca, fibre=replace(
-            tca.fibre, radius=self.radius, section=self.section, untwist_scale=self.untwist,
-            load_softening=_SOFTENED if self.softened else (0.0, 0.0, 1.0),
-        ))  # fmt: skip
-
-
-_TWO, _ONE = THICKNESS / 2.0, CATALOGUE["free-stroke"].fibre.radius
-THREADS = (
-    Thread("one thread (in use)", _ONE, True),
-    Thread("one thread, not softened", _ONE, False),
-    Thread("one thread, hot section", _ONE, True, "hot"),
-    Thread("one thread, untwist x 1.6", _ONE, True, "cold", 1.6),
-    Thread("two threads (before)", _TWO, False),
-    Thread("two threads, hot section", _TWO, False, "hot"),
-    Thread("two threads, untwist x 1.7", _TWO, False, "cold", 1.7),
-)
+_ONE = Choice(CATALOGUE["free-stroke"].fibre.radius, softened=True)
+_TWO = Choice(THICKNESS / 2.0)
+# What the moduli are taken on, softened by the load as in Chapter 3 or not, in words.
+THREADS: Mapping[str, Choice] = MappingProxyType({
+    "one thread (in use)": _ONE,
+    "one thread, not softened": _ONE._replace(softened=False),
+    "one thread, hot section": _ONE._replace(section="hot"),
+    "one thread, untwist x 1.6": _ONE._replace(untwist=1.6),
+    "two threads (before)": _TWO,
+    "two threads, hot section": _TWO._replace(section="hot"),
+    "two threads, untwist x 1.7": _TWO._replace(untwist=1.7),
+})  # fmt: skip
 
 
 class Facts(NamedTuple):
@@ -85,18 +58,14 @@ class Facts(NamedTuple):
         )  # fmt: skip
 
 
-def facts(thread: Thread) -> Facts:
+def facts(thread: Choice) -> Facts:
     """Computes them."""
     tca = thread.tca("type-2-200")
-    cold, data, annealed = hanging_length(tca, [25.0, 160.0, ANNEALED], weight(10))
+    cold, data, annealed = hanging_length(tca, [25.0, 160.0, ANNEALED], strokes.weight(10))
     _, second, _, fourth = four_lengths(thread.tca("type-1-180"), "free")
-    names = [name for name in TYPES if name != "type-0-180"]
-    tcas = LoadedTcas([thread.tca(name) for name in names], Load.weight(0.020))
-    course = tcas.simulate(tcas.rest(), Heating(source="current", value=1.0), 0.02, 100,
-                           "quasistatic")  # fmt: skip
+    course = run(map(thread.tca, NAMES), 0.02)
     return Facts(
-        contractions=tuple(contraction(thread.tca(name), grams, 150.0)
-                           for name, grams in CONTRACTIONS),
+        contractions=tuple(thread.contractions().tolist()),
         stroke=100.0 * float(1.0 - data / cold), annealed=100.0 * float(1.0 - annealed / cold),
         pull=float(tension(tca, tca.rest_length, 160.0, spin="locked")[0]),
         end=float(tension(tca, 0.52 * tca.rest_length + 0.5e-3, ANNEALED, spin="locked")[0]),
@@ -106,34 +75,31 @@ def facts(thread: Thread) -> Facts:
     )  # fmt: skip
 
 
-def table(threads: Iterable[Thread] = THREADS) -> str:
+def table() -> str:
     """The table, as Markdown, and what it says."""
-    lines = [
+    rows = [["*published*", "4, 20", "24, 44", "55", "0.4, 0.4", f"up to {DEVIATION}", "above 0",
+             "60", "", ""]]  # fmt: skip
+    for words, thread in THREADS.items():
+        row = facts(thread)
+        a, b, c, d = row.contractions
+        rows.append([
+            words, f"{a:.1f}, {b:.1f}", f"{c:.1f}, {d:.1f}",
+            f"{row.stroke:.0f}, {row.annealed:.0f}", f"{row.pull:.2f}, {max(row.end, 0.0):.2f}",
+            f"{row.overlap[0]:.1f}, {row.overlap[1]:.1f}", f"{row.temporary:.1f}",
+            f"{row.largest:.0f}", f"{sum(row.held)}", "no" if thread.untwist == 1.0 else "yes",
+        ])  # fmt: skip
+    heads = ["thread", "0 g, types 0, 1 [mm]", "40 g [mm]", "55 % under 10 g [%]",
+             "0.4 N, start and end [N]", "below 70 °C [mm]", "l4 - l2 [mm]", "1 A, 2 s [mm]",
+             "held of 11", "fitted"]  # fmt: skip
+    return "\n".join([
         "Chapters 2 and 3 twist the same thread under the same weight. One thread has the EA, EI"
         " and GJ that were measured in Chapter 3, two threads take its moduli on the thickness of"
         " 0.34 mm. Strokes and pull are those of type 2-200 (10 g, to 160 and 200 °C; at the"
         " natural length at 160 °C and at the end of the free stroke at 200 °C), the temporary"
         " length is by how much l4 exceeds l2 with ends free to spin. The loss to air is that in"
         " use, which was fitted with one thread.",
-        "",
-        "| thread | 0 g, types 0, 1 [mm] | 40 g [mm] | 55 % under 10 g [%] | 0.4 N, start and end"
-        " [N] | below 70 °C [mm] | l4 - l2 [mm] | 1 A, 2 s [mm] | held of 11 | fitted |",
-        "|---" * 10 + "|",
-        f"| *published* | 4, 20 | 24, 44 | 55 | 0.4, 0.4 | up to {DEVIATION} | above 0 | 60 | | |",
-    ]
-    for thread in threads:
-        row = facts(thread)
-        a, b, c, d = row.contractions
-        lines.append(
-            f"| {thread.words} | {a:.1f}, {b:.1f} | {c:.1f}, {d:.1f} | {row.stroke:.0f},"
-            f" {row.annealed:.0f} | {row.pull:.2f}, {max(row.end, 0.0):.2f} |"
-            f" {row.overlap[0]:.1f}, {row.overlap[1]:.1f} | {row.temporary:.1f} |"
-            f" {row.largest:.0f} | {sum(row.held)} | {'no' if thread.untwist == 1.0 else 'yes'} |"
-        )
-    lines += [
-        "",
+        "", *pages.table(heads, rows), "",
         "One thread holds more than two, with nothing fitted. A larger untwist (1.6 times, as the"
         " self-coiled TCA has it) would hold the drag over the whole stroke and loses as much"
         " elsewhere, so that it stays at 1.",
-    ]
-    return "\n".join(lines)
+    ])  # fmt: skip

@@ -1,0 +1,40 @@
+"""Results as pages: tables and pictures in Markdown, and the same as data beside them."""
+
+import json
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Any
+
+from tca_mj.files import write_whole
+
+
+def table(heads: Sequence[str], rows: Iterable[Iterable[str]]) -> list[str]:
+    """Lines of a table in Markdown.
+
+    Args:
+        heads: Titles of the columns.
+        rows: A cell for each of them.
+    """
+    head, *lines = (
+        "|" + "".join(f" {cell} |" if cell else " |" for cell in row) for row in (heads, *rows)
+    )
+    return [head, "|---" * len(heads) + "|", *lines]
+
+
+def made_with(result: dict[str, Any]) -> list[str]:
+    """Two lines on the ``machine`` and ``versions`` that a result states."""
+    where = result["machine"]
+    kept = ", ".join(f"{name} {number}" for name, number in result["versions"].items())
+    return [f"{where['cpu']}, {where['cores']} cores; {where['system']}", kept]
+
+
+def picture(caption: str, path: str) -> list[str]:
+    """Lines of a picture with its caption below it."""
+    return [f"![{caption}]({path})", "", f"*{caption}*", ""]
+
+
+def write_result(out: Path, name: str, result: Any, text: str, *, indent: int = 2) -> None:
+    """Writes a result as ``<name>.json`` and what it says as ``<name>.md`` into a folder."""
+    data = json.dumps(result, indent=indent, ensure_ascii=False)
+    for ending, content in ((".json", data), (".md", text)):
+        write_whole(out / f"{name}{ending}", f"{content}\n".encode())

@@ -1,0 +1,124 @@
+"""Films of a simulation, drawn by ``tca_mj.record.render``.
+
+They need imageio and imageio-ffmpeg, which are loaded when the first one is begun.
+"""
+
+import importlib
+from pathlib import Path
+from typing import Any, Self
+
+import mujoco
+
+from tca_mj.checks import require_count, require_positive
+from tca_mj.record.render import Offscreen, Watched, colour_tendons
+
+
+class Film:
+    """A simulation filmed at a steady rate, whatever its control period; a context manager.
+
+    The file is an mp4 (H.264, yuv420p). Frames go to the encoder one by one and are not kept.
+    """
+
+    def __init__(
+        self,
+        simulation: Watched,
+        path: str | Path,
+        *,
+        fps: float = 30.0,
+        speed: float = 1.0,
+        width: int = 960,
+        height: int = 720,
+        camera: int | str | mujoco.MjvCamera = -1,
+    ) -> None:
+        """Prepares the file; OpenGL is set up by the first frame.
+
+        Args:
+            simulation: What to film.
+            path: File to write, ending ``.mp4``; its folder is made if it is missing.
+            fps: Frames per second of the film [1/s].
+            speed: Simulated seconds per second of film.
+            width: Width, a multiple of 16 [pixels].
+            height: Height, a multiple of 16 [pixels].
+            camera: As in ``Offscreen``.
+
+        Raises:
+            ImportError: If imageio or imageio-ffmpeg is not installed.
+            ValueError: If a number is out of range.
+        """
+        require_positive(fps=fps, speed=speed)
+        require_count(width=width, height=height)
+        if width % 16 or height % 16:
+            raise ValueError(f"size must be multiples of 16 pixels, got {width} x {height}")
+        self.simulation, self.path = simulation, Path(path)
+        if self.path.suffix != ".mp4":
+            raise ValueError(f"path must end in .mp4, got {self.path}")
+        self._imageio = _imageio()
+        self._writer: Any = None
+        self._fps, self._rate = fps, fps / speed
+        self._size = width, height
+        self._camera = camera
+        self._view: Offscreen | None = None
+        self._start = self._last = simulation.time
+        self._written = 0
+
+    def frame(self) -> None:
+        """Films the present; call it after every step, as often as you like.
+
+        Draws only when a frame is due, and repeats it when several are. A simulation that was
+        reset is filmed on without a gap.
+
+        Raises:
+            RenderingUnavailable: If OpenGL cannot be had.
+        """
+        time = self.simulation.time
+        if time < self._last:
+            self._start += time - self._last
+        self._last = time
+        due = int((time - self._start) * self._rate + 1e-6) + 1 - self._written
+        if due <= 0:
+            return
+        model = self.simulation.model
+        if self._view is None or self._view.model is not model:
+            self._close_view()
+            width, height = self._size
+            self._view = Offscreen(model, width=width, height=height, camera=self._camera)
+        colour_tendons(model, self.simulation.tendon, self.simulation.temperature)
+        picture = self._view.draw(self.simulation.data)
+        if self._writer is None:
+            self.path.parent.mkdir(parents=True, exist_ok=True)
+            self._writer = self._imageio.get_writer(
+                self.path, format="FFMPEG", mode="I", fps=self._fps, codec="libx264",
+                pixelformat="yuv420p", quality=8, macro_block_size=16, ffmpeg_log_level="error",
+            )
+        for _ in range(due):
+            self._writer.append_data(picture)
+        self._written += due
+
+    def close(self) -> None:
+        """Finishes the file; it may be called again."""
+        self._close_view()
+        if self._writer is not None:
+            self._writer.close()
+            self._writer = None
+
+    def _close_view(self) -> None:
+        if self._view is not None:
+            self._view.close()
+            self._view = None
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+
+def _imageio() -> Any:
+    """The imageio module that makes films."""
+    try:
+        importlib.import_module("imageio_ffmpeg")
+        return importlib.import_module("imageio.v2")
+    except ImportError as error:
+        raise ImportError(
+            "films need imageio and imageio-ffmpeg: pip install 'tca-mj[demo]'"
+        ) from error

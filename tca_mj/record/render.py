@@ -1,0 +1,242 @@
+"""Pictures and films of a simulation, drawn without a screen.
+
+Nothing is loaded before the first picture. Which way to OpenGL works on a machine can only be
+found out by trying, and a bad driver may end the process that tries: it is tried in a process of
+its own, once. ``MUJOCO_GL`` (``egl``, ``osmesa``, ``glfw``) names one way and is then the only one
+that is tried; ``mujoco`` itself may have been imported before.
+
+On Debian and Ubuntu ``egl`` needs the packages ``libegl1`` and ``libgl1-mesa-dri`` (or a graphics
+driver), ``osmesa`` needs ``libosmesa6``.
+"""
+
+import atexit
+import functools
+import importlib
+import os
+import subprocess
+import sys
+import weakref
+from typing import Any, Protocol, Self
+
+import mujoco
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from tca_mj.checks import require_count
+from tca_mj.record.plots import temperature_colour
+
+_PROBE = """
+import importlib, sys
+import mujoco
+context = importlib.import_module("mujoco." + sys.argv[1]).GLContext(64, 64)
+context.make_current()
+drawing = mujoco.MjrContext(mujoco.MjModel.from_xml_string("<mujoco/>"), 100)
+drawing.free()
+context.free()
+"""
+_PROBE_SECONDS = 60.0
+_OFF = ("disable", "disabled", "off", "false", "0")
+_ANY = ("", "enable", "enabled", "on", "true", "1")
+
+
+class RenderingUnavailable(RuntimeError):
+    """Pictures cannot be drawn here; the message says what to install."""
+
+
+class Watched(Protocol):
+    """What a camera needs of a simulation; ``tca_mj.sim.Simulation`` has it."""
+
+    @property
+    def model(self) -> mujoco.MjModel: ...
+    @property
+    def data(self) -> mujoco.MjData: ...
+    @property
+    def time(self) -> float: ...
+    @property
+    def tendon(self) -> NDArray[Any]: ...
+    @property
+    def temperature(self) -> NDArray[np.float64]: ...
+
+
+def gl_backend() -> str:
+    """Name of a way to OpenGL that works here: ``egl``, ``osmesa``, ``glfw`` or ``cgl``.
+
+    The first call starts short processes that try; the answer is kept.
+
+    Raises:
+        RenderingUnavailable: If none works, or ``MUJOCO_GL`` forbids or names one that fails.
+    """
+    # PyOpenGL binds itself to one platform for the life of the process.
+    bound = os.environ.get("PYOPENGL_PLATFORM", "") if "OpenGL.platform" in sys.modules else ""
+    return _working_backend(os.environ.get("MUJOCO_GL", "").lower().strip(), bound.lower())
+
+
+@functools.cache
+def _working_backend(wanted: str, bound: str) -> str:
+    if wanted in _OFF:
+        raise RenderingUnavailable(f"rendering is switched off by MUJOCO_GL={wanted}; unset it")
+    if wanted not in _ANY:
+        candidates: tuple[str, ...] = ({"glx": "glfw", "wgl": "glfw"}.get(wanted, wanted),)
+    elif sys.platform.startswith("linux"):
+        screen = "DISPLAY" in os.environ or "WAYLAND_DISPLAY" in os.environ
+        candidates = ("egl", "glfw", "osmesa") if screen else ("egl", "osmesa")
+    else:
+        candidates = ("cgl", "glfw") if sys.platform == "darwin" else ("glfw",)
+    if bound in ("egl", "osmesa"):
+        candidates = tuple(c for c in candidates if c == bound or c not in ("egl", "osmesa"))
+    failures = []
+    for candidate in candidates:
+        failure = _probe(candidate)
+        if failure is None:
+            return candidate
+        failures.append(f"{candidate}: {failure}")
+    raise RenderingUnavailable(
+        "no OpenGL for drawing without a screen. On Debian or Ubuntu install "
+        "'libegl1 libgl1-mesa-dri' (MUJOCO_GL=egl) or 'libosmesa6' (MUJOCO_GL=osmesa); on a "
+        "machine with a graphics card its driver brings EGL; everything else of the package "
+        f"works without pictures. Tried {'; '.join(failures) or 'nothing: ' + bound + ' is bound'}"
+    )
+
+
+@functools.cache
+def _probe(backend: str) -> str | None:
+    """None if a process that draws with ``backend`` lives, else why it does not."""
+    environment = dict(os.environ, MUJOCO_GL=backend)
+    environment.pop("PYOPENGL_PLATFORM", None)
+    try:
+        done = subprocess.run(
+            [sys.executable, "-c", _PROBE, backend], env=environment, capture_output=True,
+            text=True, timeout=_PROBE_SECONDS, check=False,
+        )
+    except (OSError, subprocess.TimeoutExpired) as error:
+        return str(error)
+    if done.returncode == 0:
+        return None
+    # A driver that fails is noisy at exit, too: the first error is the cause.
+    errors = [line for line in done.stderr.splitlines() if "Error" in line.split(":")[0]]
+    return errors[0].strip() if errors else f"the process that tried ended with {done.returncode}"
+
+
+def colour_tendons(model: mujoco.MjModel, tendon: ArrayLike, temperature: ArrayLike) -> None:
+    """Gives tendons the colours of their temperatures, in ``model.tendon_rgba``.
+
+    Only pictures change: MuJoCo's physics does not read colours.
+
+    Args:
+        model: Model whose colours are written.
+        tendon: Ids of the tendons, shape (n,).
+        temperature: Their temperatures, shape (n,) [°C].
+    """
+    model.tendon_rgba[np.asarray(tendon, dtype=np.int64), :3] = temperature_colour(temperature)
+
+
+class Offscreen:
+    """A camera and the memory it draws into; a context manager."""
+
+    def __init__(
+        self,
+        model: mujoco.MjModel,
+        *,
+        width: int = 960,
+        height: int = 720,
+        camera: int | str | mujoco.MjvCamera = -1,
+    ) -> None:
+        """Sets up OpenGL.
+
+        Args:
+            model: Model to draw.
+            width: Width of the pictures [pixels].
+            height: Height of the pictures [pixels].
+            camera: Id or name of a camera of the model, a camera of one's own, or -1 for the
+                model's overview.
+
+        Raises:
+            RenderingUnavailable: If OpenGL cannot be had.
+            ValueError: If the size is not positive or the camera does not exist.
+        """
+        require_count(width=width, height=height)
+        self.camera = _camera(model, camera)
+        self.model = model
+        self._rectangle = mujoco.MjrRect(0, 0, width, height)
+        self._scene = mujoco.MjvScene(model, maxgeom=20_000)
+        self._option = mujoco.MjvOption()
+        self._option.sitegroup[:] = 0  # the sites that lead the TCAs would hide them
+        self._gl: Any = None
+        self._drawing: Any = None
+        backend = gl_backend()
+        try:
+            self._gl = importlib.import_module(f"mujoco.{backend}").GLContext(width, height)
+            self._gl.make_current()
+            # The model states the size of MuJoCo's buffer; ours counts for this one drawing.
+            screen = model.vis.global_
+            size = screen.offwidth, screen.offheight
+            screen.offwidth, screen.offheight = width, height
+            try:
+                self._drawing = mujoco.MjrContext(model, int(mujoco.mjtFontScale.mjFONTSCALE_100))
+            finally:
+                screen.offwidth, screen.offheight = size
+            mujoco.mjr_setBuffer(int(mujoco.mjtFramebuffer.mjFB_OFFSCREEN), self._drawing)
+        except Exception as error:
+            self.close()
+            raise RenderingUnavailable(f"OpenGL by {backend} failed: {error}") from error
+        # What is still open at exit must go before the OpenGL library does, which would complain.
+        self._at_exit = functools.partial(_close, weakref.ref(self))
+        atexit.register(self._at_exit)
+
+    def draw(self, data: mujoco.MjData) -> NDArray[np.uint8]:
+        """Picture of ``data``, shape (height, width, 3).
+
+        Raises:
+            RuntimeError: If it is closed.
+        """
+        if self._drawing is None:
+            raise RuntimeError("the camera is closed")
+        self._gl.make_current()
+        mujoco.mjv_updateScene(
+            self.model, data, self._option, None, self.camera,
+            int(mujoco.mjtCatBit.mjCAT_ALL), self._scene,
+        )
+        mujoco.mjr_render(self._rectangle, self._scene, self._drawing)
+        pixels = np.empty((self._rectangle.height, self._rectangle.width, 3), dtype=np.uint8)
+        mujoco.mjr_readPixels(pixels, None, self._rectangle, self._drawing)
+        return np.ascontiguousarray(pixels[::-1])  # OpenGL counts rows from below
+
+    def close(self) -> None:
+        """Gives the memory back; it may be called again."""
+        if self._drawing is not None:
+            self._gl.make_current()
+            self._drawing.free()
+            self._drawing = None
+        if self._gl is not None:
+            self._gl.free()
+            self._gl = None
+            atexit.unregister(getattr(self, "_at_exit", _close))
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+
+def _close(reference: weakref.ref[Offscreen]) -> None:
+    camera = reference()
+    if camera is not None:
+        camera.close()
+
+
+def _camera(model: mujoco.MjModel, camera: int | str | mujoco.MjvCamera) -> mujoco.MjvCamera:
+    if isinstance(camera, mujoco.MjvCamera):
+        return camera
+    made = mujoco.MjvCamera()
+    if isinstance(camera, str):
+        index = mujoco.mj_name2id(model, int(mujoco.mjtObj.mjOBJ_CAMERA), camera)
+    else:
+        index = camera
+    if camera == -1:
+        mujoco.mjv_defaultFreeCamera(model, made)
+    elif 0 <= index < model.ncam:
+        made.type, made.fixedcamid = int(mujoco.mjtCamera.mjCAMERA_FIXED), index
+    else:
+        raise ValueError(f"camera must be one of the model's {model.ncam}, or -1, got {camera!r}")
+    return made

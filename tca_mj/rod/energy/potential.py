@@ -1,0 +1,280 @@
+"""Energy of soft bodies with strands as a function of their strains, with its derivatives.
+
+With the strain xi = (u, v) of a body's centre line, g' = g xi^ for its frames, the energy is
+
+    E = sum over segments of integral 1/2 (xi - xi*)^T K (xi - xi*) ds
+        + sum over strands of U_a(l_a) - f . p(tip) - gravity . (sum of mass times position),
+
+U_a' = tension, with the length of a strand l_a = sum over its legs of the integral of |w| ds,
+w = v + u x r + r' at the offset r. A moment on the tip that is fixed in the world has no energy;
+its virtual work has a derivative, the antisymmetric part of which tells so.
+
+The strains are polynomials on pieces of the rod, given at Gauss's points, which are those of the
+integrals too: the elastic part of the Hessian is one small block for each point, and the work of
+the loads has gradient and Hessian in closed form (``tca_mj.rod.energy.motion``).
+
+Pure numbers inside: length over that of all segments L, force over the smallest EI/L².
+"""
+
+from dataclasses import dataclass
+from typing import cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tca_mj.checks import Array
+from tca_mj.quadrature import lagrange
+from tca_mj.rod.energy.mesh import POINTS, Mesh
+from tca_mj.rod.energy.motion import BASIS, Pieces, lump, rigid
+from tca_mj.rod.lie import hat, matrix_quaternion, quaternion_log
+from tca_mj.rod.problem import Segment, StaticProblem, asked
+from tca_mj.rod.sections import Sections, place
+from tca_mj.rod.shape import RodShape
+
+_TAIL = 1e-9  # last Legendre coefficients of the strain, times the length of the piece
+_TURN = 6.0  # of a piece [rad]: below, the points integrate a constant strain to 1e-12
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class State:
+    """The rod at given strains, n pieces of q points with m strains each.
+
+    Attributes:
+        strain: The strains, shape (n, q, m).
+        factor: Part of the load that acts.
+        pieces: Motions over the pieces.
+        before: G at the start of the pieces, shape (n, 5, 5).
+        after: What follows on the end of the pieces up to the tip, shape (n, 5, 5).
+        tip: G at the tip.
+        pull: Derivative of the loads' work by G at the tip, shape (5, 5).
+        elastic: Energy of the bodies.
+        work: Work of force and gravity.
+        length: Lengths of the strands, shape (k,).
+        tension: Their tensions, shape (k,).
+        stiffness: Derivatives of the tensions by the lengths, shape (k,).
+        drawn: Gradients of the lengths over the weights of the points, shape (k, n, q, m).
+        slope: Gradient of the energy without loads over the weights, shape (n, q, m).
+        bend: Its derivative at fixed tensions, shape (n, q, m, m).
+        shortest: Smallest |w| of a strand.
+    """
+
+    strain: Array
+    factor: float
+    pieces: Pieces
+    before: Array
+    after: Array
+    tip: Array
+    pull: Array
+    elastic: float
+    work: float
+    length: Array
+    tension: Array
+    stiffness: Array
+    drawn: Array
+    slope: Array
+    bend: Array
+    shortest: float
+
+
+class Potential:
+    """The energy of a problem on one mesh.
+
+    Attributes:
+        mesh: The mesh.
+        unloaded: Strains without loads and tensions, shape (n, q, m).
+        conservative: Whether there is an energy: no moment acts on the tip.
+        metric: Twice the elastic energy of unit strains at each point, shape (n, q, m).
+    """
+
+    def __init__(self, problem: StaticProblem, mesh: Mesh) -> None:
+        """Scales the problem."""
+        self.mesh, self._rule = mesh, mesh.rule
+        self._problem = problem
+        self._segments = segments = cast(tuple[Segment, ...], problem.segments)
+        beams = [segment.beam for segment in segments]
+        self._size = sum(beam.length for beam in beams)
+        self._force = min(min(beam.bending) for beam in beams) / self._size**2
+        self._active = np.arange(6) if problem.shearable else np.array([0, 1, 2, 5])
+        self._basis = BASIS[self._active]
+        owner = mesh.owner
+        self._span = mesh.part * np.array([beam.length for beam in beams])[owner] / self._size
+        self._weight = self._span[:, None] * self._rule.weight
+        self._laws = [law for segment in segments for law in segment.tensions]
+        parts = [place(segments, k, mesh.points(k).ravel()) for k in range(len(segments))]
+        self._sections = Sections.joined(parts).scaled(self._size, self._force)
+        shape = len(owner), POINTS, 6
+        self._stiffness = self._sections.stiffness.reshape(shape)[..., self._active]
+        self.unloaded = self._sections.reference.reshape(shape)[..., self._active]
+        self._density = np.array([beam.line_density for beam in beams])[owner]
+        self._density = self._density * self._size / self._force
+        self.metric = self._weight[..., None] * self._stiffness
+        self._moment = np.asarray(problem.tip_moment) / (self._force * self._size)
+        self.conservative = not self._moment.any()
+        # What is rigid between the pieces, and at the tip.
+        self._joint = np.tile(np.eye(5), (len(owner), 1, 1))
+        self._end = np.eye(5)
+        for index, segment in enumerate(segments):
+            turn = rigid(segment.rotation, np.asarray(segment.offset) / self._size)
+            self._joint[np.argmax(owner == index)] = self._end @ turn
+            self._end = lump(segment.mass / self._force, np.asarray(segment.centre) / self._size)
+
+    def rough(self, strain: Array) -> NDArray[np.bool_]:
+        """Pieces that are too long for these strains, shape (n,)."""
+        turn = np.sum(self._weight * np.linalg.norm(self._full(strain)[..., :3], axis=-1), axis=1)
+        rough: NDArray[np.bool_] = (self.mesh.tail(strain) * self._span > _TAIL) | (turn > _TURN)
+        return rough
+
+    def _full(self, strain: Array) -> Array:
+        """All six strains of the m that may change, shape (..., 6)."""
+        whole = np.zeros((*strain.shape[:-1], 6))
+        whole[..., self._active] = strain
+        return whole
+
+    def at(self, strain: Array, factor: float) -> State:
+        """Energy, and all that its derivatives need, under a part of the loads and tensions."""
+        xi = self._full(strain)
+        pieces = Pieces.of(self._rule, self._span, xi, self._density)
+        n = len(self._span)
+        before, after = np.empty((n, 5, 5)), np.empty((n, 5, 5))
+        tip, follow = np.eye(5), self._end
+        for i in range(n):
+            before[i] = tip @ self._joint[i]
+            tip = before[i] @ pieces.motion[i]
+        tip = tip @ self._end
+        for i in reversed(range(n)):
+            after[i] = follow
+            follow = self._joint[i] @ pieces.motion[i] @ follow
+
+        load = np.zeros((5, 5))
+        load[:3, 3] = factor * np.asarray(self._problem.tip_force) / self._force
+        load[:3, 4] = factor * np.asarray(self._problem.gravity)
+        pull = load.copy()
+        # A turn w of the tip changes R by w x R; the product with this is w . moment.
+        pull[:3, :3] = 0.5 * hat(factor * self._moment) @ tip[:3, :3]
+
+        sections, count, shape = self._sections, len(self._laws), strain.shape
+        density, tangent = sections.directions(xi.reshape(-1, 6))
+        length = sections.lengths(density, self._weight, count + 1)[:count]
+        law = [asked(i, law, float(length[i]) * self._size) for i, law in enumerate(self._laws)]
+        scaled = np.array(law).reshape(-1, 2) * [1.0, self._size] / self._force
+        tension, stiffness = factor * scaled.T
+        drawn = sections.pull(tangent, range(count))[:, self._active]
+        drawn = np.moveaxis(drawn, -1, 0).reshape(count, *shape)
+        bend = sections.hessian(density, tangent, np.append(tension, 0.0)[sections.strand])
+        bend = bend[:, self._active][..., self._active].reshape(*shape, shape[-1])
+        excess = strain - self.unloaded
+        stress = self._stiffness * excess
+        return State(
+            strain=strain,
+            factor=factor,
+            pieces=pieces,
+            before=before,
+            after=after,
+            tip=tip,
+            pull=pull,
+            elastic=0.5 * float(np.sum(self._weight[..., None] * stress * excess)),
+            work=float(np.sum(load * tip)),
+            length=length,
+            tension=tension,
+            stiffness=stiffness,
+            drawn=drawn,
+            slope=stress + np.tensordot(tension, drawn, 1),
+            bend=bend,
+            shortest=float(density[sections.strand < count].min(initial=1.0)),
+        )
+
+    def change(self, old: State, new: State) -> float:
+        """Energy of a state minus that of another one nearby, with a moment's work on the way.
+
+        A strand's energy is the integral of its tension, by Hermite's formula of fourth order.
+        """
+        longer = new.length - old.length
+        stored = 0.5 * longer @ (old.tension + new.tension)
+        stored += longer * longer @ (old.stiffness - new.stiffness) / 12.0
+        turn = quaternion_log(matrix_quaternion(new.tip[:3, :3] @ old.tip[:3, :3].T))
+        work = new.work - old.work + new.factor * self._moment @ turn
+        return float(new.elastic - old.elastic + stored - work)
+
+    def gradient(self, state: State) -> Array:
+        """Derivative of the energy by the strains, shape (n, q, m)."""
+        ring = self._ring(state)[:, range(POINTS), range(POINTS)]
+        work = np.einsum("nqij,aji->nqa", ring, self._basis)
+        gradient: Array = self._weight[..., None] * state.slope - work
+        return gradient
+
+    def _ring(self, state: State) -> Array:
+        """T_q P^T S_r with P the derivative of the work by a piece's motion, (n, q, r, 5, 5)."""
+        transposed = state.after @ state.pull.T @ state.before
+        left = state.pieces.behind @ transposed[:, None]
+        return left[:, :, None] @ state.pieces.ahead[:, None]
+
+    def hessian(self, state: State) -> tuple[Array, Array]:
+        """Second derivative of the energy, and what a moment adds to the gradient's derivative.
+
+        Returns:
+            A symmetric and an antisymmetric matrix, each (n q m) x (n q m).
+        """
+        n, q, m = state.strain.shape
+        pieces = state.pieces
+        # Points of two pieces, by the changes of G at the tip seen from the world.
+        ahead = state.before[:, None] @ pieces.ahead
+        behind = pieces.behind @ (state.after @ np.linalg.inv(state.tip))[:, None]
+        move = (ahead[:, :, None] @ self._basis @ behind[:, :, None]).reshape(n * q * m, 5, 5)
+        lever = np.swapaxes(move, 1, 2) @ (state.pull @ state.tip.T)
+        across = -lever.reshape(-1, 25) @ move.reshape(-1, 25).T
+        piece = np.repeat(np.arange(n), q * m)
+        across *= piece[:, None] < piece
+        hessian = across + across.T
+        # Points of one piece.
+        one = np.einsum("nqrij,ajk->nrqaik", self._ring(state), self._basis)
+        two = np.einsum("nrqkl,bli->nrqbik", pieces.between, self._basis)
+        within = one.reshape(n, q, q, m, 25) @ np.swapaxes(two.reshape(n, q, q, m, 25), -1, -2)
+        within = within.swapaxes(2, 3).reshape(n, q * m, q * m)
+        blocks, of = hessian.reshape(n, q * m, n, q * m), np.arange(n)
+        blocks[of, :, of, :] -= within + np.swapaxes(within, 1, 2)
+        # The bodies with strands of fixed tension, then the strands' stiffness.
+        blocks, of = hessian.reshape(n * q, m, n * q, m), np.arange(n * q)
+        blocks[of, :, of, :] += (self._weight[..., None, None] * state.bend).reshape(n * q, m, m)
+        drawn = (self._weight[..., None] * state.drawn).reshape(len(self._laws), n * q * m)
+        hessian += (drawn.T * state.stiffness) @ drawn
+        turn = np.stack([move[:, 2, 1], move[:, 0, 2], move[:, 1, 0]], axis=-1)
+        return hessian, -0.5 * turn @ hat(state.factor * self._moment) @ turn.T
+
+    def distance(self, change: Array) -> float:
+        """Turn and stretch of the whole rod in a change of its strains."""
+        return float(np.sum(self._weight * np.linalg.norm(change, axis=-1)))
+
+    def shapes(self, state: State, points: int) -> tuple[RodShape, ...]:
+        """One shape for each segment under the whole load, in SI units."""
+        force, gravity = np.asarray(self._problem.tip_force), np.asarray(self._problem.gravity)
+        moment = np.asarray(self._problem.tip_moment)
+        moment = moment + np.cross(state.tip[:3, 3] * self._size, force)
+        masses = np.array([segment.beam.mass + segment.mass for segment in self._segments])
+        s = np.linspace(0.0, 1.0, points)
+        shapes, strand = [], 0
+        for index, segment in enumerate(self._segments):
+            piece, place = self.mesh.inside(index, s)
+            # From the start of its piece to each point.
+            known = self._rule.node
+            inner = lagrange(known, place[:, None] * known) @ state.strain[piece]
+            part = Pieces.of(
+                self._rule, place * self._span[piece], self._full(inner), self._density[piece]
+            )
+            frame = state.before[piece] @ part.motion
+            strain = self._full(self.mesh.at(state.strain, index, s))
+            strain[:, :3] /= self._size
+            own = slice(strand, strand + len(segment.routes))
+            strand = own.stop
+            beyond = (state.tip[:3, 4] - frame[0, :3, 4]) * self._force * self._size
+            shapes.append(
+                RodShape(
+                    position=self._size * frame[:, :3, 3],
+                    rotation=frame[:, :3, :3].copy(),
+                    arc_length=segment.beam.length * s,
+                    strain=strain,
+                    tca_length=self._size * state.length[own],
+                    base_force=0.0 - force - masses[index:].sum() * gravity,
+                    base_moment=0.0 - moment - np.cross(beyond, gravity),
+                )
+            )
+        return tuple(shapes)

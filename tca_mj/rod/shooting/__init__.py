@@ -1,0 +1,1 @@
+"""Balance of the sections of soft bodies in series, by collocation and multiple shooting."""

@@ -1,0 +1,1 @@
+"""Motion of TCAs that lift weights or pull on springs."""

@@ -1,0 +1,125 @@
+"""What hangs at TCAs, what heats them, and the states of their motion."""
+
+import math
+from dataclasses import dataclass, fields
+from typing import Literal, get_args
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from tca_mj.checks import Array, floats, within
+
+Source = Literal["power", "voltage", "current"]
+
+GRAVITY = 9.81  # [m/s^2]
+
+
+@dataclass(frozen=True, kw_only=True, slots=True, eq=False)
+class Load:
+    """What hangs at TCAs, scalars or arrays that broadcast with (..., n).
+
+    Attributes:
+        force: Pull on the TCA at the length ``reference`` [N].
+        stiffness: Growth of the pull per contraction, not negative [N/m].
+        reference: Length of the TCA at which the pull is ``force`` [m].
+        mass: Mass that moves with the end, not negative [kg].
+        damping: Force per speed of the end, of the TCA and what it moves, not negative [N s/m].
+    """
+
+    force: float | Array
+    stiffness: float | Array = 0.0
+    reference: float | Array = 0.0
+    mass: float | Array = 0.0
+    damping: float | Array = 0.0
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            within(field.name, getattr(self, field.name), at_least=0.0)
+
+    @classmethod
+    def weight(cls, mass: float | Array, damping: float | Array = 0.0) -> "Load":
+        """A hanging mass [kg]."""
+        weight = within("mass", mass, at_least=0.0, unit="kg") * GRAVITY
+        return cls(force=weight, mass=mass, damping=damping)
+
+    @classmethod
+    def spring(
+        cls,
+        stiffness: float | Array,
+        pretension: float | Array,
+        reference: float | Array,
+        mass: float | Array = 0.0,
+        damping: float | Array = 0.0,
+    ) -> "Load":
+        """A linear spring between the TCA's end and a wall, Sun, Section 3.4.4, case 2.
+
+        Args:
+            stiffness: Of the spring [N/m].
+            pretension: Tension of both at the length ``reference``; there 0.05 N.
+            reference: Length of the TCA at mounting [m].
+            mass: Mass of what joins the two [kg].
+            damping: As of ``Load`` [N s/m].
+        """
+        return cls(
+            force=pretension, stiffness=stiffness, reference=reference, mass=mass, damping=damping
+        )
+
+
+@dataclass(frozen=True, kw_only=True, slots=True, eq=False)
+class Heating:
+    """What heats and cools TCAs during a step, scalars or arrays that broadcast with (..., n).
+
+    Attributes:
+        source: Which quantity is held: "power" [W], "voltage" [V] or "current" [A].
+        value: Its value; a power is not negative.
+        air: Factor on the heat transfer coefficient: 1 still air, above 1 blown air, above 0.
+    """
+
+    source: Source = "power"
+    value: float | Array = 0.0
+    air: float | Array = 1.0
+
+    def __post_init__(self) -> None:
+        if self.source not in get_args(Source):
+            raise ValueError(f"source must be one of {get_args(Source)}, got {self.source!r}")
+        within("value", self.value, at_least=0.0 if self.source == "power" else -math.inf)
+        within("air", self.air, above=0.0)
+
+    def power(self, resistance: ArrayLike) -> Array:
+        """Joule heat in given resistances, the broadcast shape [W]."""
+        ohms = floats("resistance", resistance)
+        if self.source == "voltage":
+            return np.square(self.value) / ohms
+        if self.source == "current":
+            return np.square(self.value) * ohms
+        return self.value + 0.0 * ohms
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LoadState:
+    """State of n loaded TCAs, each array of shape (..., n).
+
+    Attributes:
+        length: Length of the TCA [m].
+        velocity: Its rate, negative while it contracts; 0 in quasi-static motion [m/s].
+        temperature: Temperature [°C].
+        power: Mean electrical power of the step that led here, 0 before the first [W].
+    """
+
+    length: Array
+    velocity: Array
+    temperature: Array
+    power: Array
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Course(LoadState):
+    """States over time: ``time`` of shape (k,), the others (k, ..., n)."""
+
+    time: Array
+
+    @classmethod
+    def of(cls, states: LoadState, dt: float) -> "Course":
+        """States ``dt`` apart, (k, ..., n)."""
+        time = dt * np.arange(len(states.length), dtype=np.float64)
+        return cls(states.length, states.velocity, states.temperature, states.power, time)

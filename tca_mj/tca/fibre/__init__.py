@@ -1,0 +1,1 @@
+"""The twisted fibre itself: any reference shape, and its shape under heat and load."""

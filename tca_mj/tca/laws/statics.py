@@ -1,0 +1,188 @@
+"""Length of a TCA under a load, and tension at a length: three models side by side.
+
+    model       what it is                                             file
+    "rod"       Cosserat rod as a uniform helix, exact                  coil.py
+    "love"      torsion and bending only, Love's equation               love.py
+    "cst"       Castigliano's two coefficients, three schemes           castigliano.py
+
+All use the same untwist, the same softening by heat and load, a cold or hot section as the
+fibre says, and the same contact of the coils, that of ``CoilRods``: from ``minimum_length`` on
+downwards a spring of ``contact_ratio`` times the stiffness of the cold coil with locked ends,
+which sets in over ``contact_smoothing`` of that length. Every TCA's reference, where it is free of
+stress at the reference temperature, is the shape that its spec states (``pitch_angle``,
+``coil_radius``), under any load. For a TCA that has crept under a load state the crept pitch:
+``tca.of_pitch(...)``.
+
+An end is "free" to spin about the axis (a hanging weight) or "locked" (glued). That is 13 to
+22 % of the stroke. Love's equation has locked ends; with ``spin="free"`` the model "love" is the
+rod without shear and stretch, which is what is left of it without that assumption.
+
+A fibre stiffer in shear than in stretch (G > E), which no thread is, can make a coil that snaps
+between several lengths; then one of them is returned, or ``CoilSolveError`` raised.
+
+Loads above ``breaking_force`` and temperatures outside ``fibre.temperature_range`` are computed:
+the laws extrapolate.
+"""
+
+from collections.abc import Callable
+from typing import get_args
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from tca_mj.checks import Array, within
+from tca_mj.tca.laws.castigliano import Scheme
+from tca_mj.tca.laws.coil import Spin
+from tca_mj.tca.laws.model import CoilModel, Model
+from tca_mj.tca.spec import TcaSpec
+
+_CHUNK = 4096  # elements solved at a time: what fits into a processor's cache
+
+
+def hanging_length(
+    tca: TcaSpec,
+    temperature: ArrayLike,
+    load: ArrayLike,
+    *,
+    model: Model = "rod",
+    spin: Spin | None = None,
+    scheme: Scheme = "implicit",
+) -> Array:
+    """Length at which a TCA carries a load.
+
+    Args:
+        tca: The TCA.
+        temperature: Temperature, any shape, broadcast with ``load`` [°C].
+        load: Axial force, not negative, any shape [N].
+        model: "rod", "love" or "cst".
+        spin: Whether an end is "free" to spin or both are "locked". None is what the model's own
+            equations assume: "locked" for "love", "free" for the others.
+        scheme: Where "cst" takes its coefficients: at the natural shape ("linear"), at the
+            deformed one ("implicit") or along the way ("path"). The other models ignore it.
+
+    Returns:
+        Length between the ends, the broadcast shape [m].
+
+    Raises:
+        ValueError: If a load is negative or needs a length beyond 98 % of the fibre's, or leaves
+            no modulus; if a temperature is not above absolute zero and below the fibre's
+            melting temperature, or leaves no modulus or no helix; if a name is unknown.
+        CoilSolveError: If the shape is not found.
+    """
+    if spin is None:
+        spin = "locked" if model == "love" else "free"
+    problem = _checked_model(tca, model, spin, scheme)
+    load = within("load", load, at_least=0.0, unit="N")
+    (length,) = _in_chunks(lambda *each: (problem.hang(*each),), _checked(tca, temperature), load)
+    return length
+
+
+def tension(
+    tca: TcaSpec,
+    length: ArrayLike,
+    temperature: ArrayLike,
+    *,
+    model: Model = "rod",
+    spin: Spin = "locked",
+    scheme: Scheme = "implicit",
+) -> tuple[Array, Array]:
+    """Tension of a TCA at a length, and its slope: the inverse of ``hanging_length``.
+
+    Ends are locked unless stated otherwise, as in a body; state the same ``spin`` as for
+    ``hanging_length`` to get its inverse. For "rod" with locked ends this is ``coil_tension``.
+
+    Args:
+        tca: The TCA.
+        length: Length between the ends, any shape, broadcast with ``temperature`` [m].
+        temperature: Temperature, any shape [°C].
+        model: "rod", "love" or "cst".
+        spin: Whether an end is "free" to spin or both are "locked".
+        scheme: As in ``hanging_length``.
+
+    Returns:
+        Tension F, not clipped: negative when the coil is pushed [N], and stiffness dF/dl at
+        constant temperature [N/m], each of the broadcast shape.
+
+    Raises:
+        ValueError: If a length is outside half of the minimum length to 98 % of the fibre's; if a
+            temperature is not above absolute zero and below the fibre's melting temperature, or
+            leaves no modulus or no helix; if a name is unknown.
+        CoilSolveError: If the shape is not found.
+    """
+    problem = _checked_model(tca, model, spin, scheme)
+    shortest, longest = problem.domain
+    length = within("length", length, at_least=shortest, at_most=longest, unit="m")
+    force, stiffness = _in_chunks(problem.tension, length, _checked(tca, temperature))
+    return force, stiffness
+
+
+def law_at(
+    tca: TcaSpec,
+    temperature: float,
+    *,
+    spin: Spin = "locked",
+    model: Model = "rod",
+    scheme: Scheme = "implicit",
+) -> Callable[[ArrayLike], tuple[Array, Array]]:
+    """What a body feels of a TCA that is kept at a temperature: max(0, F) over the length.
+
+    Args:
+        tca: The TCA.
+        temperature: Its temperature [°C].
+        spin: As in ``tension``.
+        model: As in ``tension``.
+        scheme: As in ``hanging_length``.
+
+    Returns:
+        A function of the length [m], of any shape, that gives the tension [N], never negative,
+        and its slope [N/m], both of that shape. Slack, also where the coils would push each
+        other, both are 0. It raises ValueError for a length that is not between 0 and 98 % of the
+        fibre's, and CoilSolveError as ``tension``.
+
+    Raises:
+        ValueError: As ``tension``, or if coils that are pressed to half of the minimum length
+            still pull.
+    """
+    problem = _checked_model(tca, model, spin, scheme)
+    shortest, longest = problem.domain
+    hot = _checked(tca, temperature, ())
+    pressed, _ = problem.tension(np.array([shortest]), hot[None])
+    if pressed[0] > 0.0:
+        raise ValueError(
+            f"contact_ratio must be larger for {temperature} °C, where the coils pull with"
+            f" {pressed[0]} N at half of their minimum length, got {tca.contact_ratio}"
+        )
+
+    def law(length: ArrayLike) -> tuple[Array, Array]:
+        length = within("length", length, at_least=0.0, at_most=longest, unit="m")
+        inside = np.maximum(length.ravel(), shortest)
+        force, slope = problem.tension(inside, np.broadcast_to(hot, inside.shape))
+        taut = (force > 0.0).reshape(length.shape)
+        force, slope = force.reshape(length.shape), slope.reshape(length.shape)
+        return np.where(taut, force, 0.0)[()], np.where(taut, slope, 0.0)[()]
+
+    return law
+
+
+def _checked_model(tca: TcaSpec, model: Model, spin: Spin, scheme: Scheme) -> CoilModel:
+    for name, value, choice in (("model", model, Model), ("spin", spin, Spin),
+                                ("scheme", scheme, Scheme)):  # fmt: skip
+        if value not in get_args(choice):
+            raise ValueError(f"{name} must be one of {get_args(choice)}, got {value!r}")
+    return CoilModel.of(tca, model, spin, scheme)
+
+
+def _checked(tca: TcaSpec, temperature: ArrayLike, shape: tuple[int, ...] | None = None) -> Array:
+    """Temperatures [°C] at which there is a fibre."""
+    melting = tca.fibre.melting_temperature
+    return within("temperature", temperature, above=-273.15, below=melting, unit="°C", shape=shape)
+
+
+def _in_chunks(solve: Callable[..., tuple[Array, ...]], *arrays: Array) -> list[Array]:
+    """What a solver of one dimension gives for arrays of any shape, broadcast together."""
+    first, *_ = every = np.broadcast_arrays(*arrays)
+    parts = [
+        solve(*[array.ravel()[begin : begin + _CHUNK] for array in every])
+        for begin in range(0, max(first.size, 1), _CHUNK)
+    ]
+    return [np.concatenate(part).reshape(first.shape)[()] for part in zip(*parts, strict=True)]

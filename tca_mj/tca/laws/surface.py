@@ -1,0 +1,74 @@
+"""The tension law of n TCAs, read from their surfaces: three times as fast as the rods."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from tca_mj.checks import Array, floats
+from tca_mj.tca.arrays import column
+from tca_mj.tca.laws.rod import CoilRods
+from tca_mj.tca.laws.table import calibrate, evaluate
+from tca_mj.tca.spec import TcaSpec
+
+
+class CoilSurfaces:
+    """The tension law of n TCAs from their surfaces; used as ``CoilRods``, which it stands for.
+
+    Elements outside the surface's temperatures are solved by the rod, and every element depends
+    on its own inputs alone, bit for bit.
+
+    Attributes:
+        n: Number of TCAs.
+        rods: The rods of the same TCAs.
+        surfaces: The surface of each TCA.
+        shortest: Lower end of the law's domain, shape (n,) [m].
+        longest: Upper end of the law's domain, shape (n,) [m].
+        coldest: Lowest temperature in the tables, shape (n,) [°C].
+        hottest: Highest temperature in the tables, shape (n,) [°C].
+    """
+
+    def __init__(self, specs: Sequence[TcaSpec]) -> None:
+        self.rods = CoilRods(specs)
+        self.n = self.rods.n
+        known = {key: calibrate(tca) for key, tca in {id(tca): tca for tca in specs}.items()}
+        self.surfaces = tuple(known[id(tca)] for tca in specs)
+        self.shortest, self.longest = self.rods.shortest, self.rods.longest
+        self.coldest = column(self.surfaces, "coldest")
+        self.hottest = column(self.surfaces, "hottest")
+        p, q = np.array([surface.cells for surface in self.surfaces]).T
+        fibre_length = column(specs, "fibre_length")
+        ends = np.array([(surface.shortest, surface.longest) for surface in self.surfaces]).T
+        self._start = fibre_length * ends[0]
+        self._per_metre = p / (fibre_length * (ends[1] - ends[0]))
+        self._per_kelvin = q / (self.hottest - self.coldest)
+        # All tables side by side, one column per cell.
+        offset, columns, size = {}, [], 0
+        for surface in {id(surface): surface for surface in self.surfaces}.values():
+            offset[id(surface)] = float(size)
+            columns.append(surface.polynomials().reshape(-1, 12).T)
+            size += columns[-1].shape[1]
+        self._table = np.ascontiguousarray(np.concatenate(columns, axis=1))
+        self._offset = np.array([offset[id(surface)] for surface in self.surfaces])
+        self._row = q + 1.0
+
+    def tension(self, length: ArrayLike, temperature: ArrayLike) -> tuple[Array, Array]:
+        """Tension of the coils and its slope over length; all as ``CoilRods.tension``."""
+        length, temperature = floats("length", length), floats("temperature", temperature)
+        if length.shape == temperature.shape and length.shape[-1:] == (self.n,):
+            inside = (length >= self.shortest) & (length <= self.longest)
+            inside &= (temperature >= self.coldest) & (temperature <= self.hottest)
+            if inside.all():
+                return self._read(length, temperature)
+        exact = self.rods.tension(length, temperature)  # raises if anything is wrong
+        inside = (temperature >= self.coldest) & (temperature <= self.hottest)
+        read = self._read(length, np.clip(temperature, self.coldest, self.hottest))
+        return np.where(inside, read[0], exact[0]), np.where(inside, read[1], exact[1])
+
+    def _read(self, length: Array, temperature: Array) -> tuple[Array, Array]:
+        x = (length - self._start) * self._per_metre
+        t = (temperature - self.coldest) * self._per_kelvin
+        i, j = np.floor(x), np.floor(t)
+        cell = (i * self._row + (j + self._offset)).astype(np.intp)
+        stiff, slope = evaluate(self._table.take(cell, axis=1), x - i, t - j)
+        return self.rods.finished(length, temperature, stiff, slope * self._per_metre)

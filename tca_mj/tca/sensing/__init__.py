@@ -1,0 +1,1 @@
+"""Resistance of TCAs and what a circuit measures of it."""

@@ -1,0 +1,215 @@
+"""Electrical resistance of a TCA against its length, and the length read back from it.
+
+The silver-coated thread of a TCA with free stroke rises in resistance as it contracts and
+falls as it is stretched, nearly alike at every load and speed [Sun, dissertation, Colorado State
+University, Section 2.3.1]. The law is R = R_0 (1 - c strain), with the strain counted from the
+natural length and two slopes: a cold TCA that is stretched loses little, 0.55 ohm per 50 %, a
+heated one that contracts gains "~20 %" over its actuation (Section 3.1.1). It has no temperature
+term, because none has been published: temperature and contraction rose together.
+
+Three curves of it are measured there, and two of them disagree with one R(length). The resistance
+of a cold TCA falls as a load stretches it (R-F). But hot TCAs start contracting from different
+loaded lengths, after a heating cycle in which they crept, and their resistances over the
+displacement from there nearly overlap (R-D): what a load stretches for good hardly counts. So
+``resistance_displacement`` counts from the loaded start, and of the load it knows the elastic
+stretch.
+
+A sensor measures the mean current under a pulsed voltage, with noise and steps (``measured``),
+and a polynomial of third order reads the displacement from it (``fit_displacement``).
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.polynomial import Polynomial
+from numpy.typing import ArrayLike
+
+from tca_mj.checks import Array, number, within
+from tca_mj.tca.arrays import column
+from tca_mj.tca.spec import TcaSpec
+
+
+class WireTable(NamedTuple):
+    """Electrical constants of n TCAs, each field of shape (n,).
+
+    Attributes:
+        rest_length: Natural length [m].
+        rest_resistance: Resistance R_0 at the natural length [ohm].
+        stretch: Relative fall of the resistance per unit strain beyond it [1].
+        contraction: Relative rise of the resistance per unit contraction below it [1].
+    """
+
+    rest_length: Array
+    rest_resistance: Array
+    stretch: Array
+    contraction: Array
+
+    @classmethod
+    def of(cls, specs: Sequence[TcaSpec]) -> "WireTable":
+        """Collects the numbers of ``specs``, in their order."""
+        rest_length = column(specs, "rest_length")
+        return cls(
+            rest_length=rest_length,
+            rest_resistance=rest_length * column(specs, "resistance_per_length"),
+            stretch=column(specs, "stretch_resistance"),
+            contraction=column(specs, "contraction_resistance"),
+        )
+
+
+def resistance(wire: WireTable, length: ArrayLike, temperature: ArrayLike) -> Array:
+    """Resistance of n TCAs.
+
+    Args:
+        wire: Constants of the n TCAs.
+        length: Length of the TCAs, shape (..., n) [m].
+        temperature: Temperature, shape (..., n) [°C]. It has no influence yet; callers give it
+            so that a temperature term will not change their code.
+
+    Returns:
+        Resistance, shape (..., n) [ohm].
+
+    Raises:
+        ValueError: If a length is not positive and finite or so long that no resistance would
+            be left, or if a temperature is not finite.
+    """
+    within("temperature", temperature)
+    strain = within("length", length, above=0.0, unit="m") / wire.rest_length - 1.0
+    left = 1.0 - np.where(strain > 0.0, wire.stretch, wire.contraction) * strain
+    return wire.rest_resistance * within("share of resistance left at this length", left, above=0.0)
+
+
+def sensed_length(wire: WireTable, resistance: ArrayLike) -> Array:
+    """Length at which n TCAs have a given resistance: the inverse of ``resistance``.
+
+    Args:
+        wire: Constants of the n TCAs, both slopes above 0.
+        resistance: Resistance, shape (..., n) [ohm].
+
+    Returns:
+        Length, shape (..., n) [m].
+
+    Raises:
+        ValueError: If a resistance is not positive and finite, or does not depend on length.
+    """
+    for name in ("stretch", "contraction"):
+        within(name, getattr(wire, name), above=0.0)
+    fall = 1.0 - within("resistance", resistance, above=0.0, unit="ohm") / wire.rest_resistance
+    strain = fall / np.where(fall > 0.0, wire.stretch, wire.contraction)
+    return wire.rest_length * (1.0 + strain)
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class SensingSpec:
+    """What little load and temperature do to the resistance of a TCA that contracts.
+
+    Attributes:
+        load: Relative fall per load. It follows from the cold slope: the load stretches the TCA
+            of Sun, Table 2.3, by F/(14.0 N/m) of its 110 mm and lowers the resistance by 0.123
+            times that, while what it has crept does not count [1/N].
+        temperature: Relative rise per kelvin at one displacement and load. None is published,
+            as temperature and displacement rose together: the curve over the displacement
+            contains it [1/K].
+        reference_temperature: Temperature at which that rise is 0 [°C].
+    """
+
+    load: float = 0.123 / (14.0 * 0.110)
+    temperature: float = 0.0
+    reference_temperature: float = 25.0
+
+    def __post_init__(self) -> None:
+        number("load", self.load, at_least=0.0)
+        for name in ("temperature", "reference_temperature"):
+            number(name, getattr(self, name))
+
+
+def resistance_displacement(
+    wire: WireTable,
+    displacement: ArrayLike,
+    load: ArrayLike = 0.0,
+    temperature: ArrayLike = 25.0,
+    sensing: SensingSpec | None = None,
+) -> Array:
+    """R-D curve: resistance of n TCAs that have contracted from their loaded, crept length.
+
+    R = R_0 (1 + c D/rest_length - a F + b (T - T_0)) with the slope c of contraction. The
+    speed does not count, Sun, Section 2.3.1.
+
+    Args:
+        wire: Constants of the n TCAs.
+        displacement: Contraction D from the start under that load, shape (..., n) [m].
+        load: Load F, broadcast with it; measured up to 70 % of the breaking force, where it hardly
+            counts (Sun, Section 2.3.1) [N].
+        temperature: Temperature, broadcast with it [°C].
+        sensing: Terms of load and temperature.
+
+    Returns:
+        Resistance, the broadcast shape [ohm].
+
+    Raises:
+        ValueError: If a number is not finite, a load negative, or no resistance would be left.
+    """
+    sensing = sensing or SensingSpec()
+    displacement = within("displacement", displacement, unit="m")
+    load = within("load", load, at_least=0.0, unit="N")
+    rise = within("temperature", temperature) - sensing.reference_temperature
+    left = 1.0 + wire.contraction * displacement / wire.rest_length - sensing.load * load
+    left = left + sensing.temperature * rise
+    return wire.rest_resistance * within("share of resistance left", left, above=0.0)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class DisplacementFit:
+    """Displacement as a polynomial of the resistance, D(R).
+
+    Attributes:
+        polynomial: The polynomial [ohm] -> [m].
+        rmse: Root of the mean squared error in the fitted points [m].
+        lowest: Lowest resistance fitted [ohm].
+        highest: Highest one [ohm].
+    """
+
+    polynomial: Polynomial
+    rmse: float
+    lowest: float
+    highest: float
+
+    def displacement(self, resistance: ArrayLike) -> Array:
+        """Displacement, same shape [m]; beyond ``lowest`` and ``highest`` it extrapolates.
+
+        Raises:
+            ValueError: If a resistance is not finite.
+        """
+        return np.asarray(self.polynomial(within("resistance", resistance)))
+
+
+def fit_displacement(
+    resistance: ArrayLike, displacement: ArrayLike, degree: int = 3
+) -> DisplacementFit:
+    """Fits D(R) of one TCA by least squares, Sun, Section 2.3.2: a polynomial of third order.
+
+    Args:
+        resistance: Measured resistances, shape (k,) [ohm].
+        displacement: Displacements at which they were measured, shape (k,) [m].
+        degree: Degree of the polynomial, not negative.
+
+    Returns:
+        The polynomial and its error.
+
+    Raises:
+        ValueError: If shapes differ, a number is not finite, or there are not more different
+            resistances than ``degree``.
+    """
+    resistance = within("resistance", resistance, shape=(np.size(resistance),))
+    displacement = within("displacement", displacement, shape=resistance.shape)
+    number("degree", degree, at_least=0, below=np.unique(resistance).size)
+    polynomial = Polynomial.fit(resistance, displacement, degree)
+    error = polynomial(resistance) - displacement
+    return DisplacementFit(
+        polynomial=polynomial,
+        rmse=math.sqrt(float(np.mean(error * error))),
+        lowest=float(resistance.min()),
+        highest=float(resistance.max()),
+    )

@@ -1,0 +1,152 @@
+"""What a number for a TCA means: its power, voltage or current, or a temperature to be held.
+
+A supply has limits. Those of voltage U and current I act through the resistance R of the TCA, which
+changes with its length and temperature: P <= U^2/R and P <= I^2 R. A thermostat computes the power
+for a temperature: what the heat loss takes, and what brings the TCA there within a response time.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from tca_mj.checks import Array, within
+from tca_mj.tca.thermal import HeatSpec, power_from_voltage
+
+Quantity = Literal["power", "voltage", "current", "temperature"]
+UNITS: dict[Quantity, str] = {"power": "W", "voltage": "V", "current": "A", "temperature": "°C"}
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Thermostat:
+    """Power that brings TCAs to a temperature: what keeps T* + C (T* - T)/τ, within limits.
+
+    What keeps a bare TCA is λ (T* - T_amb); one in a soft body also warms that, G (T* - T_body).
+
+    Attributes:
+        heat: Thermal constants, arrays of shape (n,).
+        max_power: Largest power of each TCA, shape (n,) or one number [W].
+        response: Time τ in which an error would vanish [s].
+        max_temperature: Limit of every target [°C].
+
+    Raises:
+        ValueError: If a number is not positive.
+    """
+
+    heat: HeatSpec
+    max_power: float | Array
+    response: float = 0.4
+    max_temperature: float = 175.0
+
+    def __post_init__(self) -> None:
+        for name in ("max_power", "response", "max_temperature"):
+            value = np.asarray(getattr(self, name), dtype=np.float64)
+            if not (np.isfinite(value) & (value > 0.0)).all():
+                raise ValueError(f"{name} must be finite and above 0, got {value}")
+
+    def power(
+        self, temperature: ArrayLike, target: ArrayLike, body: ArrayLike | None = None
+    ) -> Array:
+        """Power for TCAs at ``temperature`` that ought to be at ``target``, shape (..., n) [W].
+
+        Args:
+            temperature: Temperatures, shape (..., n) [°C].
+            target: Wanted ones, same shape [°C].
+            body: Temperatures of what they lie in, same shape; None if that is cold [°C].
+        """
+        goal = np.minimum(np.asarray(target, dtype=np.float64), self.max_temperature)
+        error = goal - np.asarray(temperature, dtype=np.float64)
+        steady = self.heat.keeping(goal, self.heat.ambient if body is None else body)
+        return np.clip(steady + self.heat.capacity * error / self.response, 0.0, self.max_power)
+
+
+@dataclass(frozen=True, kw_only=True, slots=True, eq=False)
+class Supply:
+    """How the TCAs of a simulation are driven.
+
+    With ``temperature`` a thermostat holds each TCA there, as often as the TCAs are updated. A
+    temperature that is not above its idea of the surroundings' is off.
+
+    Attributes:
+        quantity: What is commanded, one of ``UNITS``.
+        max_power: Largest power of each TCA, one number or shape (n,) [W].
+        max_voltage: Largest voltage, of either sign [V].
+        max_current: Largest current, of either sign [A].
+        thermostat: What holds temperatures; needed for them, and for nothing else.
+
+    Raises:
+        ValueError: If the quantity is unknown, a limit is not above 0, or the thermostat is
+            missing.
+    """
+
+    quantity: Quantity = "power"
+    max_power: float | Array = math.inf
+    max_voltage: float | Array = math.inf
+    max_current: float | Array = math.inf
+    thermostat: Thermostat | None = None
+
+    def __post_init__(self) -> None:
+        if self.quantity not in UNITS:
+            raise ValueError(f"quantity must be one of {list(UNITS)}, got {self.quantity!r}")
+        for name in ("max_power", "max_voltage", "max_current"):
+            limit = np.asarray(getattr(self, name), dtype=np.float64)
+            if not (limit > 0.0).all():
+                raise ValueError(f"{name} must be above 0, got {getattr(self, name)!r}")
+        if (self.quantity == "temperature") != (self.thermostat is not None):
+            raise ValueError(
+                f"thermostat must be given for temperature and nothing else, got {self.thermostat}"
+                f" for {self.quantity}"
+            )
+
+    def checked(self, command: ArrayLike, n: int) -> Array:
+        """A command, shape (n,), in the unit of the quantity.
+
+        Raises:
+            ValueError: If the shape is another, or a number is not finite, or a power negative.
+        """
+        least = 0.0 if self.quantity == "power" else -math.inf
+        unit = UNITS[self.quantity]
+        return np.array(within(self.quantity, command, at_least=least, unit=unit, shape=(n,)))
+
+    def power(
+        self, command: Array, temperature: Array, body: Array, resistance: Callable[[], Array]
+    ) -> Array:
+        """Electrical power of the TCAs, shape (..., n) [W].
+
+        Args:
+            command: What is commanded, shape (..., n).
+            temperature: Their temperatures, same shape [°C].
+            body: Temperatures of what they lie in, same shape [°C].
+            resistance: Gives their resistances, same shape, if it is asked to [ohm].
+
+        Raises:
+            ValueError: As ``resistance`` does.
+        """
+        quantity, limits = self.quantity, (self.max_voltage, self.max_current)
+        limited = any(np.isfinite(limit).any() for limit in limits)
+        power = command
+        if quantity == "temperature":
+            assert self.thermostat is not None
+            held = self.thermostat.power(temperature, command, body)
+            power = np.where(command > self.thermostat.heat.ambient, held, 0.0)
+        if limited or quantity in ("voltage", "current"):
+            ohms = resistance()
+            if quantity == "voltage":
+                power = power_from_voltage(command, ohms)
+            elif quantity == "current":
+                power = command**2 * ohms
+            power = np.minimum(power, np.square(self.max_voltage) / ohms)
+            power = np.minimum(power, np.square(self.max_current) * ohms)
+        return np.minimum(power, self.max_power)
+
+    def like(self, other: "Supply") -> bool:
+        """Whether another supply does the same."""
+        same = (
+            np.array_equal(np.asarray(getattr(self, name)), np.asarray(getattr(other, name)))
+            for name in ("max_power", "max_voltage", "max_current")
+        )
+        mine, others = self.thermostat, other.thermostat
+        return self.quantity == other.quantity and all(same) and repr(mine) == repr(others)
