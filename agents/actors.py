@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tca_mj.agents.policy import Policy, load_policy
+from tca_mj.agents.policy import Policy, SavedPolicy, find, load_policy, require_arguments
+from tca_mj.registry import task_class
 
 NAMES = ("scripted", "off", "random")
 
@@ -84,16 +85,29 @@ def actor(name: str | Path, env: Any, *, seed: int = 0) -> Policy:
     return Still(env.unwrapped.action.still)
 
 
+def arguments_of(name: str | Path, task: str) -> dict[str, Any]:
+    """Arguments of a task that a policy needs it to be made with; errors as ``actor``.
+
+    Args:
+        name: As for ``actor``.
+        task: Gymnasium id, or ``module:id``.
+    """
+    if name == "scripted":
+        return dict(task_class(task).scripted_arguments)
+    return {} if str(name) in NAMES else dict(SavedPolicy.read(find(best_of(name))).arguments)
+
+
 def scripted(env: Any) -> Policy:
     """The scripted policy of an environment's task.
 
     Raises:
-        ValueError: If it has none.
+        ValueError: If it has none, or the task was not made with ``scripted_arguments``.
     """
     task = env.unwrapped
     maker = task.scripted
     if maker is None:
         raise ValueError(f"policy 'scripted': {type(task).__name__} has none")
+    require_arguments(task.scripted_arguments, env)
     if isinstance(maker, str):
         module, _, name = maker.partition(":")
         maker = getattr(import_module(module), name)

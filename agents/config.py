@@ -103,6 +103,7 @@ class TrainConfig:
         seed: Seed of everything that is drawn.
         envs: Environments that are stepped together.
         options: Options of every reset, in training and in evaluation.
+        arguments: What the task is made with: ``action``, ``control_period``.
         residual: Largest correction of a gait's temperatures, which is what is learned then; 0 for
             a policy of its own [K].
         start: The gait that is corrected: ``scripted``, ``trot``, or a policy's file or name.
@@ -121,6 +122,7 @@ class TrainConfig:
     seed: int = 0
     envs: int = 8
     options: Mapping[str, float] = field(default_factory=dict)
+    arguments: Mapping[str, Any] = field(default_factory=dict)
     residual: float = 0.0
     start: str = "scripted"
     interval: int = 10_000
@@ -142,6 +144,8 @@ class TrainConfig:
             raise ValueError(f"residual must be between 0 and 50 K, got {self.residual}")
         if self.residual and not task.legs:
             raise ValueError(f"residual must be 0 for {self.task}, which has no gait")
+        if self.residual and self.arguments.get("action") != "power":
+            raise ValueError("action must be 'power' where a gait is corrected")
 
 
 def default_config(task: str, algorithm: str, **change: Any) -> TrainConfig:
@@ -160,4 +164,6 @@ def default_config(task: str, algorithm: str, **change: Any) -> TrainConfig:
     known = task_class(task)
     common["steps"] = known.learning_steps.get(algorithm, _STEPS)
     common["options"] = dict(known.learning_options)
+    residual = {"action": "power"} if change.get("residual") else known.learning_arguments
+    common["arguments"] = dict(residual)
     return TrainConfig(**common | change)

@@ -134,7 +134,13 @@ class CourseWalker:
     stalled = 35.0  # time without headway after which another gait is tried [s]
 
     def __init__(self, env: TetrapodCourse) -> None:
-        """A controller for ``env``, of which it uses limits and places, not the state."""
+        """A controller for ``env``, of which it uses limits and places, not the state.
+
+        Raises:
+            ValueError: If the action is not the power of the TCAs.
+        """
+        if env.heating != "power":
+            raise ValueError(f"action must be 'power' for this policy, got {env.heating!r}")
         self._dt = env.control_period
         self._max_power = env.max_power
         self._voltage = env.max_voltage

@@ -7,10 +7,11 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 
-from tca_mj.agents.actors import actor
+from tca_mj.agents.actors import actor, arguments_of
 from tca_mj.agents.episode import RECORDING, Episode
 from tca_mj.agents.policy import Policy
 from tca_mj.envs.wrappers import RecordRerun
+from tca_mj.registry import make
 
 
 def play(
@@ -19,6 +20,7 @@ def play(
     *,
     seed: int = 0,
     options: Mapping[str, Any] | None = None,
+    arguments: Mapping[str, Any] | None = None,
     out: Path | None = None,
     video: bool = True,
     speed: float | None = None,
@@ -37,6 +39,7 @@ def play(
         policy: Who acts: a policy, or what ``tca_mj.agents.actors.actor`` knows by name.
         seed: Seed of the episode.
         options: Options of the reset.
+        arguments: Of the task; None for what a policy with a name needs, else the task's own.
         out: Folder for the files, made if it is missing; None to write nothing.
         video: Whether to make the film, which takes longer than the simulation.
         speed: Simulated seconds per second of film; None for what suits the task.
@@ -69,7 +72,9 @@ def play(
         raise ValueError(f"max_duration must be above 0 s, got {max_duration}")
     if speed is not None and not (np.isfinite(speed) and speed > 0.0):
         raise ValueError(f"speed must be finite and above 0, got {speed}")
-    env: gym.Env[Any, Any] = gym.make(task)
+    named = isinstance(policy, str | Path)
+    needed = arguments_of(str(policy), task) if named and arguments is None else arguments or {}
+    env: gym.Env[Any, Any] = make(task, **needed)
     told: Any = env.unwrapped
     limit = max_duration or np.inf
     if env.spec is not None and env.spec.max_episode_steps is not None:

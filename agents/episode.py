@@ -17,10 +17,10 @@ from tca_mj.agents.policy import Policy
 from tca_mj.envs.task import Headway, how_it_ended
 from tca_mj.envs.wrappers import RecordRerun
 from tca_mj.files import write_whole
-from tca_mj.film import Film
 from tca_mj.machine import machine, versions
-from tca_mj.plots import rollout_plot
-from tca_mj.render import RenderingUnavailable
+from tca_mj.record.film import Film
+from tca_mj.record.plots import rollout_plot
+from tca_mj.record.render import RenderingUnavailable
 
 SUMMARY, RECORDING, VIDEO, PLOT = "summary.json", "rollout.rrd", "rollout.mp4", "rollout.png"
 

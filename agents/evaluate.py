@@ -22,14 +22,14 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 import tca_mj  # noqa: F401  (registers the tasks in a new process)
-from tca_mj.agents.actors import NAMES, actor, best_of
+from tca_mj.agents.actors import NAMES, actor, arguments_of, best_of
 from tca_mj.agents.design import robot_of
 from tca_mj.agents.policy import find
 from tca_mj.agents.rollout import rollout
 from tca_mj.envs.task import how_it_ended
 from tca_mj.files import write_whole
 from tca_mj.machine import machine, versions
-from tca_mj.registry import task_class
+from tca_mj.registry import make, task_class
 
 EPISODES, SUMMARY, REPORT = "episodes.jsonl", "summary.json", "summary.md"
 
@@ -114,19 +114,20 @@ class Evaluation:
         return hashlib.sha256(text.encode()).hexdigest()[:16]
 
     def make(self) -> gym.Env[Any, Any]:
-        """The environment.
+        """The environment, as the policy needs it.
 
         Raises:
             ValueError: If the time step does not fit.
         """
-        more: dict[str, Any] = {} if self.timestep is None else {"timestep": self.timestep}
+        more = arguments_of(self.policy, self.task)
+        more |= {} if self.timestep is None else {"timestep": self.timestep}
         task = task_class(self.task)
         if self.design:
             more |= robot_of(self.task, self.design)
         if self.model != "used":
             argument, default = task.robot_argument
             more |= task.finer[self.model](more.get(argument) or default())
-        return gym.make(self.task, max_episode_steps=self.steps, **more)
+        return make(self.task, max_episode_steps=self.steps, **more)
 
 
 def run_episode(evaluation: Evaluation, seed: int) -> dict[str, Any]:

@@ -53,9 +53,12 @@ class GaitPolicy:
         """A gait in an environment.
 
         Raises:
-            ValueError: If no gait can do the task, or its legs are not those of the gait.
+            ValueError: If no gait can do the task, its legs are not those of the gait, or its
+                action is not the power of the TCAs.
         """
         task = env.unwrapped
+        if task.heating != "power":
+            raise ValueError(f"action must be 'power' for a gait, got {task.heating!r}")
         if task.legs != gait.legs:
             raise ValueError(f"gait must have {task.legs} legs, got {gait.legs}")
         n = task.action.size

@@ -107,7 +107,7 @@ def run_trial(trial: Trial) -> Headway:
 
 @functools.cache  # one in each process
 def _env(task: str) -> gym.Env[Any, Any]:
-    return gym.make(task, disable_env_checker=True)
+    return gym.make(task, disable_env_checker=True, action="power")
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)

@@ -12,7 +12,7 @@ from tca_mj.control.pi import PiSpec
 from tca_mj.envs.morph import ACTION, OBSERVATION, MorphModule
 from tca_mj.modules.morphing import MorphingSpec
 from tca_mj.smp.lumped import LumpedModule
-from tca_mj.tca.sensing import DisplacementFit, fit_displacement
+from tca_mj.tca.sensing.wire import DisplacementFit, fit_displacement
 
 # Gains of the angle's controller, tuned on the module, hanging and weightless. Far away a large
 # gain and little integral, or it would overshoot; within 10°, for good, a gain that keeps away from

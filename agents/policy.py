@@ -26,6 +26,7 @@ from numpy.typing import NDArray
 from tca_mj.agents.gait_policy import GaitPolicy
 from tca_mj.agents.network import Network
 from tca_mj.control import Gait
+from tca_mj.envs.task import HEATINGS
 from tca_mj.files import write_whole
 
 FORMAT = 1
@@ -78,6 +79,7 @@ class SavedPolicy:
         steering: As in ``GaitPolicy``, one number per leg [K/rad].
         network: The network, of the kinds ``network`` and ``residual``.
         bound: Largest correction of a temperature, of the kind ``residual`` [K].
+        arguments: What the task was made with: ``action``, ``control_period``.
 
     Raises:
         ValueError: If there is neither gait nor network, or the bound is missing or negative.
@@ -89,6 +91,7 @@ class SavedPolicy:
     steering: tuple[float, ...] = ()
     network: Network | None = None
     bound: float = 0.0
+    arguments: Mapping[str, Any] = field(default_factory=lambda: {"action": "power"})
 
     def __post_init__(self) -> None:
         if self.gait is None and self.network is None:
@@ -121,7 +124,8 @@ class SavedPolicy:
         if path.suffix != KINDS[self.kind]:
             raise ValueError(f"path must end in {KINDS[self.kind]} for a {self.kind}, got {path}")
         header: dict[str, Any] = {
-            "format": FORMAT, "kind": self.kind, "task": self.task, "origin": asdict(self.origin)
+            "format": FORMAT, "kind": self.kind, "task": self.task, "origin": asdict(self.origin),
+            "arguments": dict(self.arguments),
         }  # fmt: skip
         if self.gait is not None:
             header |= {"gait": asdict(self.gait), "steering": self.steering}
@@ -167,6 +171,7 @@ class SavedPolicy:
                 steering=tuple(header.get("steering", ())),
                 network=_network(header, arrays) if header["kind"] != "gait" else None,
                 bound=header.get("bound", 0.0),
+                arguments=header.get("arguments", {"action": "power"}),
             )
         except FileNotFoundError:
             raise
@@ -250,6 +255,7 @@ def load_policy(source: str | Path, env: Any) -> Policy:
     spec = env.spec
     if spec is not None and spec.id != saved.task.rpartition(":")[2]:
         raise ValueError(f"{source} is a policy for {saved.task}, not for {spec.id}")
+    require_arguments(saved.arguments, env)
     network = saved.network
     if network is not None:
         given = (env.observation_space.shape[0], env.action_space.shape[0])
@@ -260,6 +266,21 @@ def load_policy(source: str | Path, env: Any) -> Policy:
                 f" {given[0]} and {given[1]}"
             )
     return saved.make(env)
+
+
+def require_arguments(arguments: Mapping[str, Any], env: Any) -> None:
+    """Refuses an environment that was made with other arguments than a policy needs.
+
+    Raises:
+        ValueError: If one of ``action`` and ``control_period`` differs.
+    """
+    task: Any = env.unwrapped
+    given = {"action": task.heating, "control_period": task.control_period}
+    usual = {"action": HEATINGS[0], "control_period": type(task).control_period}
+    for name, value in given.items():
+        needed = arguments.get(name) or usual[name]
+        if needed != value:
+            raise ValueError(f"{name} must be {needed!r} for this policy, got {value!r}")
 
 
 def find(source: str | Path) -> Path:

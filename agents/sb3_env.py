@@ -11,7 +11,7 @@ from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices, VecEnvS
 
 from tca_mj.envs.task import SimulatedTask
 from tca_mj.envs.vector import TaskVector
-from tca_mj.registry import find_task, task_class
+from tca_mj.registry import episode_steps, find_task, task_class
 
 
 class TaskVecEnv(VecEnv):
@@ -50,9 +50,8 @@ class TaskVecEnv(VecEnv):
         Raises:
             ValueError: If the id is of no such task, or as ``TaskVector``.
         """
-        spec = find_task(id)
-        task, limit = task_class(id), kwargs.pop("max_episode_steps", spec.max_episode_steps)
-        given = {**spec.kwargs, **kwargs}
+        limit = kwargs.pop("max_episode_steps", episode_steps(id, kwargs.get("control_period")))
+        task, given = task_class(id), {**find_task(id).kwargs, **kwargs}
         return cls(TaskVector(task, num_envs=num_envs, max_episode_steps=limit, **given))
 
     def reset(self) -> NDArray[np.float32]:

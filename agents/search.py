@@ -16,13 +16,12 @@ from multiprocessing.process import BaseProcess
 from pathlib import Path
 from typing import Any
 
-import gymnasium as gym
 import numpy as np
 from cmaes import CMA
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from tca_mj.agents.actors import scripted
+from tca_mj.agents.actors import arguments_of, scripted
 from tca_mj.agents.gait_policy import GaitPolicy
 from tca_mj.agents.gait_score import Headway, Reference, Trial, run_trial, score
 from tca_mj.agents.gait_space import GaitSpace
@@ -31,7 +30,7 @@ from tca_mj.agents.runs import CURVE, LIBRARIES, RunFolder
 from tca_mj.checks import require_count
 from tca_mj.control import Gait
 from tca_mj.machine import versions
-from tca_mj.registry import task_class
+from tca_mj.registry import make, task_class
 
 TROT = (0.5, 0.0, 0.0, 0.5)  # offsets of four legs, diagonal ones together
 BEST, LAST = "best.json", "last.json"
@@ -127,7 +126,7 @@ def first_gait(task: str, start: str) -> tuple[Gait, tuple[float, ...]]:
         ValueError: If it is a policy without a gait.
     """
     if start in ("scripted", "trot"):
-        env = gym.make(task, disable_env_checker=True)
+        env = make(task, disable_env_checker=True, **arguments_of("scripted", task))
         script = scripted(env)
         env.close()
         if not isinstance(script, GaitPolicy):

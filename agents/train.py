@@ -34,9 +34,10 @@ from tca_mj.agents.runs import CURVE, LIBRARIES, RunFolder
 from tca_mj.agents.sb3_env import TaskVecEnv
 from tca_mj.agents.search import first_gait
 from tca_mj.envs.wrappers import RecordRerun
-from tca_mj.film import Film
 from tca_mj.machine import versions
-from tca_mj.render import RenderingUnavailable
+from tca_mj.record.film import Film
+from tca_mj.record.render import RenderingUnavailable
+from tca_mj.registry import episode_steps, make
 
 EVALUATIONS = "evaluations.csv"
 BEST, LAST = "best", "last"  # with the ending of their kind
@@ -118,7 +119,9 @@ class Run:
         self.evaluations: list[dict[str, float]] = [] if state is None else state["evaluations"]
         self.best: tuple[float, SavedPolicy] | None = None if state is None else state["best"]
         self._gait = first_gait(config.task, config.start) if config.residual else None
-        tasks = TaskVecEnv.make(config.task, config.envs, reset_options=dict(config.options))
+        tasks = TaskVecEnv.make(
+            config.task, config.envs, reset_options=dict(config.options), **config.arguments
+        )
         self.env = LearningEnv(tasks, self._gait, config.residual)
         if state is None:
             self.normalise = VecNormalize(self.env, gamma=config.learner.gamma)
@@ -135,9 +138,14 @@ class Run:
                 self.model.replay_buffer = pickle.loads(state["replay"])  # type: ignore[attr-defined]
             _set_generators(self.model, state["generators"])
         self.model.set_logger(Logger(folder=None, output_formats=[]))
-        self.test_env: gym.Env[Any, Any] = gym.make(config.task)
+        self.test_env: gym.Env[Any, Any] = self._made()
         self.board = folder.tensorboard(self.model.num_timesteps)
         self.marks = self.model.num_timesteps // config.interval
+
+    def _made(self) -> gym.Env[Any, Any]:
+        """The task, by itself."""
+        made: gym.Env[Any, Any] = make(self.config.task, **self.config.arguments)
+        return made
 
     def due(self) -> bool:
         """Whether an interval is over."""
@@ -183,10 +191,12 @@ class Run:
         )  # fmt: skip
         network = exported(self.model, self.normalise)
         if gait is None:
-            return SavedPolicy(task=config.task, origin=origin, network=network)
+            return SavedPolicy(
+                task=config.task, origin=origin, network=network, arguments=config.arguments
+            )
         return SavedPolicy(
             task=config.task, origin=origin, network=network, gait=gait[0], steering=gait[1],
-            bound=config.residual,
+            bound=config.residual, arguments=config.arguments,
         )  # fmt: skip
 
     def save(self) -> None:
@@ -223,12 +233,12 @@ class Run:
         folder, made = self.folder.path, [RECORDING]
         with ExitStack() as ends:
             env = ends.enter_context(
-                closing(RecordRerun(gym.make(self.config.task), folder / f"part-{RECORDING}"))
+                closing(RecordRerun(self._made(), folder / f"part-{RECORDING}"))
             )
             task: Any = env.unwrapped
             frames: list[Callable[[], None]] = []
             if video:
-                steps = gym.spec(self.config.task).max_episode_steps or 1
+                steps = episode_steps(self.config.task, task.control_period) or 1
                 limit = steps * task.control_period
                 try:
                     film = Film(

@@ -2,7 +2,7 @@
 
 import math
 from functools import partial
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Unpack
 
 import mujoco
 import numpy as np
@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from tca_mj.assets import mjcf
 from tca_mj.envs.options import Option, Options, Setup, Uniform, variation_options
 from tca_mj.envs.table import Entry, Table
-from tca_mj.envs.task import SimulatedTask, Verdict
+from tca_mj.envs.task import SimulatedTask, TaskArguments, Verdict
 from tca_mj.envs.vector import TaskVector
 from tca_mj.model.scene import scene
 from tca_mj.robots.arm import ArmSpec, arm
@@ -21,30 +21,28 @@ from tca_mj.sim import Drive, Simulation
 # Objects, with the width that the gripper has to reach round [m].
 OBJECTS = {"screwdriver": 8e-3, "pcb": 3.6e-3}
 
-CAMERAS = ("front", "side", "close")
-
 OBSERVATION = Table(
     [
-        Entry("base height", 1, 0.0, 0.3, "m"),
-        Entry("base velocity", 1, -1.0, 1.0, "m/s"),
-        Entry("TCA temperature", 5, -50.0, 300.0, "°C"),
-        Entry("TCA length", 5, 0.0, 0.3, "m"),
-        Entry("TCA tension", 5, 0.0, 5.0, "N"),
-        Entry("gripper opening", 1, 0.0, 0.05, "m"),
-        Entry("gripper position", 3, -0.5, 0.5, "m"),
+        Entry("base height", 1, 0.0, 0.6, "m", centre=0.12, scale=0.05),
+        Entry("base velocity", 1, -1.0, 1.0, "m/s", scale=0.04),
+        Entry("TCA temperature", 5, -50.0, 300.0, "°C", centre=100.0, scale=75.0),
+        Entry("TCA length", 5, 0.0, 0.5, "m", centre=0.07, scale=0.04),
+        Entry("TCA tension", 5, 0.0, 5.0, "N", centre=0.1, scale=0.1),
+        Entry("gripper opening", 1, 0.0, 0.05, "m", centre=0.01, scale=0.01),
+        Entry("gripper position", 3, -0.6, 0.6, "m", scale=0.05),
         Entry("gripper orientation", 4, -1.0, 1.0, "quaternion wxyz"),
-        Entry("object width", 1, 0.0, 0.02, "m"),
-        Entry("object position", 3, -0.5, 0.5, "m"),
+        Entry("object width", 1, 0.0, 0.02, "m", centre=6e-3, scale=2e-3),
+        Entry("object position", 3, -0.6, 0.6, "m", scale=0.05),
         Entry("object orientation", 4, -1.0, 1.0, "quaternion wxyz"),
-        Entry("object velocity", 3, -10.0, 10.0, "m/s"),
-        Entry("object angular velocity", 3, -2000.0, 2000.0, "rad/s"),
-        Entry("object carried", 1, 0.0, 1.0, "1 once it has been lifted off its stand"),
-        Entry("cup position", 3, -0.5, 0.5, "m"),
+        Entry("object velocity", 3, -10.0, 10.0, "m/s", scale=0.05),
+        Entry("object angular velocity", 3, -2000.0, 2000.0, "rad/s", scale=2.0),
+        Entry("object carried", 1, 0.0, 1.0, "1 once it has been lifted off its stand", centre=0.5),
+        Entry("cup position", 3, -0.6, 0.6, "m", scale=0.025),
     ]
 )
 ACTION = Table(
     [
-        Entry("TCA power", 5, -1.0, 1.0, "-", off=-1.0),
+        Entry("TCA heating", 5, -1.0, 1.0, "-", off=-1.0),
         Entry("base velocity", 1, -1.0, 1.0, "-"),
     ]
 )
@@ -68,8 +66,8 @@ class ArmPickPlace(SimulatedTask):
     and the cup; it acts by heating its TCAs and moving its base.
 
     Action, shape (6,), all in [-1, 1]:
-        0-4: power of the TCAs ``bending.tca0`` to ``bending.tca2``, ``wrist.tca`` and
-            ``gripper.tca``; -1 is off, 1 is ``max_power``, linear in between.
+        0-4: temperature to hold, or power, of the TCAs ``bending.tca0`` to ``bending.tca2``,
+            ``wrist.tca`` and ``gripper.tca``; see ``SimulatedTask``.
         5: velocity of the base over the arm's largest speed; positive is up.
 
     Observation, shape (43,): see ``OBSERVATION``, whose rows have units and bounds. Positions and
@@ -97,51 +95,54 @@ class ArmPickPlace(SimulatedTask):
 
     max_power: ClassVar[NDArray[np.float64]] = np.array([2.0, 2.0, 2.0, 28.0, 10.0])  # [W]
     max_temperature = 180.0  # annealing temperature of the TCAs, Sun, Table 2.1 [°C]
-    control_period = 0.1  # [s]
     object_range = 5e-3  # largest offset of the object in x and in y [m]
     yaw_range = (np.radians(120.0), np.radians(155.0))
     cup_range = (23e-3, 26.5e-3)  # distance of the cup's axis from the arm's [m]
     cup_angle = np.radians(20.0)  # of the cup's direction about -x
     terms = ("reach", "carry", "energy", "place")
     energy_price = 0.002
+    cameras = ("front", "side", "close")
     scripted = "tca_mj.agents.scripted:scripted"
+    scripted_arguments = {"action": "power"}
     robot_argument = ("arm_spec", ArmSpec)
     film_speed = 4.0
 
     def __init__(
         self,
         *,
-        render_mode: str | None = None,
         arm_spec: ArmSpec | None = None,
         timestep: float = 5e-3,
-        camera: str = "front",
-        size: tuple[int, int] = (960, 720),
+        **common: Unpack[TaskArguments],
     ) -> None:
         """Builds the scene.
 
         Args:
-            render_mode: None or ``"rgb_array"``.
             arm_spec: The arm, by default the published one.
             timestep: Physics time step; five of them must divide ``control_period`` [s].
-            camera: Camera of the pictures: ``front``, ``side`` or ``close``.
-            size: Width and height of the pictures [pixels].
+            **common: See ``TaskArguments``.
 
         Raises:
             ValueError: If the render mode is unknown or the arm cannot be built.
         """
-        self._look(render_mode, camera, size, cameras=CAMERAS)
-        updates = self.control_period / (5.0 * timestep) if timestep > 0.0 else 0.0
+        own = type(self).control_period
+        updates = own / (5.0 * timestep) if timestep > 0.0 else 0.0
         if not (np.isfinite(updates) and updates > 0.5 and abs(updates - round(updates)) < 1e-9):
-            raise ValueError(
-                f"timestep must be {self.control_period} s over a multiple of 5, got {timestep}"
-            )
+            raise ValueError(f"timestep must be {own} s over a multiple of 5, got {timestep}")
         self.arm_spec = arm_spec or ArmSpec()
         files = ["cup", *(name for kind in OBJECTS for name in (kind, f"{kind}_stand"))]
         part = scene(
             mjcf("arena.xml"), arm(self.arm_spec), {f: mjcf(f"{f}.xml") for f in files}, name="arm"
         )
         sim = Simulation(part, timestep=timestep, tca_period=5.0 * timestep)
-        self._open(sim, OBSERVATION, ACTION, self._options())
+        size = self.arm_spec.height + float(sim.bank.longest.max())
+        around = (-size, size)
+        seen = OBSERVATION.covering(
+            {
+                "base height": (0.0, size), "TCA length": (0.0, float(sim.bank.longest.max())),
+                "gripper position": around, "object position": around, "cup position": around,
+            }
+        )  # fmt: skip
+        self._open(sim, seen, ACTION, self._options(), **common)
         self.object = "screwdriver"
         self._in_cup, self._carried = 0, False
         self._find(self.model)
@@ -225,16 +226,16 @@ class ArmPickPlace(SimulatedTask):
         data.qpos[start : start + 7] = [*pose, *turn]
 
     def drive(self, command: NDArray[np.float64]) -> Drive:
-        """Power of the TCAs and, at once, velocity of the base; see the class."""
+        """What the TCAs are told and, at once, velocity of the base; see the class."""
         self.data.ctrl[0] = self.arm_spec.speed * command[5]
-        return Drive(power=self.max_power * (command[:5] + 1.0) / 2.0)
+        return Drive(command=self.heated(command[:5]))
 
     def judge(self, drive: Drive, harmed: bool) -> Verdict:
         """How near the object is to the gripper and to the cup, and whether it is lost."""
         before, (self._progress, rests) = self._progress, self._measure()
         terms = {name: value - before[name] for name, value in self._progress.items()}
         self._in_cup = self._in_cup + 1 if rests else 0
-        success = self._in_cup >= 3 and not harmed
+        success = self._in_cup * self.interval > 0.3 - 1e-9 and not harmed
         lost = bool(np.hypot(*self._position()[:2]) > 0.2)
         return Verdict(
             terms=terms | {"place": 20.0 if success else 0.0},

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from functools import partial
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Unpack
 
 import mujoco
 import numpy as np
@@ -10,34 +10,35 @@ from numpy.typing import ArrayLike, NDArray
 
 from tca_mj.assets import mjcf
 from tca_mj.envs.options import Option, Options, Setup, Uniform, variation_options
-from tca_mj.envs.stance import CAMERAS as FOLLOWING
-from tca_mj.envs.stance import tetrapod_scene
+from tca_mj.envs.stance import CAMERAS, tetrapod_scene
 from tca_mj.envs.table import Entry, Table
-from tca_mj.envs.task import Headway, SimulatedTask, Verdict
+from tca_mj.envs.task import Headway, SimulatedTask, TaskArguments, Verdict
 from tca_mj.envs.vector import TaskVector
 from tca_mj.robots.tetrapod import LEGS, SPINES, TetrapodSpec
 from tca_mj.sim import Drive
 from tca_mj.smp import HeaterSpec, SpineSpec
 
-CAMERAS = (*FOLLOWING, "overview")
 TCAS = 3 * len(LEGS) + SPINES
+
+# TCAs with left and right swapped: those of the legs; the spines' stay.
+_SIDES = (4, 5, 6, 1, 2, 3, 10, 11, 12, 7, 8, 9, 13, 14, 15)
 
 OBSERVATION = Table(
     [
-        Entry("TCA temperature", TCAS, -50.0, 300.0, "°C"),
-        Entry("TCA length", TCAS, 0.0, 0.5, "m"),
-        Entry("TCA tension", TCAS, 0.0, 5.0, "N"),
-        Entry("spine temperature", SPINES, -50.0, 300.0, "°C"),
+        Entry("TCA temperature", TCAS, -50.0, 300.0, "°C", centre=100.0, scale=75.0, mirror=_SIDES),
+        Entry("TCA length", TCAS, 0.0, 0.9, "m", scale=0.05, mirror=_SIDES),
+        Entry("TCA tension", TCAS, 0.0, 5.0, "N", centre=0.2, scale=0.2, mirror=_SIDES),
+        Entry("spine temperature", SPINES, -50.0, 300.0, "°C", centre=70.0, scale=50.0),
         Entry("body angle", 1, -2.0 * np.pi, 2.0 * np.pi, "rad"),
-        Entry("position", 3, -2.0, 2.0, "m"),
-        Entry("orientation", 4, -1.0, 1.0, "quaternion wxyz"),
-        Entry("velocity", 3, -10.0, 10.0, "m/s"),
-        Entry("angular velocity", 3, -500.0, 500.0, "rad/s"),
+        Entry("position", 3, -2.0, 2.0, "m", scale=0.5, mirror=(1, -2, 3)),
+        Entry("orientation", 4, -1.0, 1.0, "quaternion wxyz", mirror=(1, -2, 3, -4)),
+        Entry("velocity", 3, -10.0, 10.0, "m/s", scale=0.05, mirror=(1, -2, 3)),
+        Entry("angular velocity", 3, -500.0, 500.0, "rad/s", scale=1.0, mirror=(-1, 2, -3)),
     ]
 )
 ACTION = Table(
     [
-        Entry("TCA power", TCAS, -1.0, 1.0, "-", off=-1.0),
+        Entry("TCA heating", TCAS, -1.0, 1.0, "-", off=-1.0, mirror=_SIDES),
         Entry("heater voltage", SPINES, -1.0, 1.0, "-", off=-1.0),
     ]
 )
@@ -108,9 +109,10 @@ class TetrapodCourse(SimulatedTask):
     gap to the next desk, clamp it, shimmy across, step off, walk to the target, lie down flat.
 
     Action, shape (18,), all in [-1, 1]; -1 is off, 1 the largest value, linear in between:
-        0-11: power of the legs' TCAs, three of each leg: front left, front right, rear left, rear
-            right; each lifts, or draws down to the front, or down to the rear.
-        12-14: power of the spines' TCAs.
+        0-11: temperature to hold, or power, of the legs' TCAs, three of each leg: front left,
+            front right, rear left, rear right; each lifts, or draws down to the front, or down to
+            the rear.
+        12-14: the same of the spines' TCAs; see ``SimulatedTask``.
         15-17: voltage of the spines' heaters.
 
     Observation, shape (62,): see ``OBSERVATION``. The body angle is the bend from rail to rail;
@@ -118,7 +120,7 @@ class TetrapodCourse(SimulatedTask):
 
     Reward, the sum of the terms in ``info["reward_terms"]``:
         progress: 10 per metre of headway, negative for going back.
-        touch: -0.1 for each step in which the robot touches the plate or its posts.
+        touch: -0.1 for every 0.1 s in which the robot touches the plate or its posts.
         damage: -5 for each spine whose TCA is for the first time contracted while it is stiff.
         finish: 20 when the robot lies flat and rigid on the target, all of its body on it.
         energy: Minus 1e-5 per joule.
@@ -134,10 +136,11 @@ class TetrapodCourse(SimulatedTask):
     max_power: ClassVar[NDArray[np.float64]] = np.array([4.0] * 12 + [40.0] * 3)  # [W]
     max_voltage = 25.0  # Sun, Section 6.1.3 [V]
     max_temperature = 180.0  # annealing temperature of the TCAs, Sun, Table 2.1 [°C]
-    control_period = 0.1  # [s]
     terms = ("progress", "touch", "damage", "finish", "energy")
     energy_price = 1e-5
+    cameras = (*CAMERAS, "overview")
     scripted = "tca_mj.agents.course:CourseWalker"
+    scripted_arguments = {"action": "power"}
     robot_argument = ("robot", _default)
     film_speed = 30.0
     published_speed = {"crawl": 2.4e-3, "walk": 9e-3, "shimmy": 0.75e-3}  # Sun, Section 6.3.2 [m/s]
@@ -145,38 +148,34 @@ class TetrapodCourse(SimulatedTask):
     def __init__(
         self,
         *,
-        render_mode: str | None = None,
         robot: TetrapodSpec | None = None,
         timestep: float = 5e-3,
         tca_period: float = 2.5e-2,
-        camera: str = "follow",
-        size: tuple[int, int] = (960, 720),
+        **common: Unpack[TaskArguments],
     ) -> None:
         """Builds the scene.
 
         Args:
-            render_mode: None or ``"rgb_array"``.
             robot: The robot, by default one with ``LIFTING_SPINE``.
             timestep: Physics time step [s].
             tca_period: Time between two updates of the TCAs, a multiple of ``timestep`` [s].
-            camera: Camera of the pictures: ``follow``, ``side``, ``front`` or ``overview``.
-            size: Width and height of the pictures [pixels].
+            **common: See ``TaskArguments``.
 
         Raises:
             ValueError: If an argument is unknown or the robot cannot be built.
         """
-        self._look(render_mode, camera, size, cameras=CAMERAS)
-        updates = self.control_period / tca_period if tca_period > 0.0 else 0.0
+        updates = type(self).control_period / tca_period if tca_period > 0.0 else 0.0
         if not (updates > 0.5 and abs(updates - round(updates)) < 1e-9):
             raise ValueError(
-                f"tca_period must divide the control period {self.control_period} s,"
+                f"tca_period must divide the control period {type(self).control_period} s,"
                 f" got {tca_period}"
             )
         self.robot = robot or _default()
         sim = tetrapod_scene(
             mjcf("course.xml"), {}, self.robot, timestep=timestep, period=tca_period
         )
-        self._open(sim, OBSERVATION, ACTION, _OPTIONS)
+        seen = OBSERVATION.covering({"TCA length": (0.0, float(sim.bank.longest.max()))})
+        self._open(sim, seen, ACTION, _OPTIONS, **common)
         self._find(self.model)
         self.touched = False
         self._x, self._harmed = 0.0, 0
@@ -231,9 +230,9 @@ class TetrapodCourse(SimulatedTask):
         self._x = float(self.position[0])
 
     def drive(self, command: NDArray[np.float64]) -> Drive:
-        """Power of the TCAs and voltage of the heaters; see the class."""
-        share = (command + 1.0) / 2.0
-        return Drive(power=self.max_power * share[:TCAS], voltage=self.max_voltage * share[TCAS:])
+        """What the TCAs are told, and voltage of the heaters; see the class."""
+        voltage = self.max_voltage * ((command[TCAS:] + 1.0) / 2.0)
+        return Drive(command=self.heated(command[:TCAS]), voltage=voltage)
 
     def judge(self, drive: Drive, harmed: bool) -> Verdict:
         """Headway, what was touched and damaged, and whether the robot lies on the target."""
@@ -245,7 +244,7 @@ class TetrapodCourse(SimulatedTask):
         unharmed = not (self.touched or self._harmed)
         terms = {
             "progress": 10.0 * headway,
-            "touch": -0.1 if touches else 0.0,
+            "touch": -0.1 * self.share if touches else 0.0,
             "damage": -5.0 * (self._harmed - before),
             "finish": 20.0 if finished else 0.0,
         }

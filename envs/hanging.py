@@ -1,5 +1,7 @@
 """A bending module that hangs from a stand, and where its tip rests."""
 
+from collections.abc import Sequence
+
 import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -9,6 +11,7 @@ from tca_mj.model.part import Part, new_spec
 from tca_mj.model.scene import scene
 from tca_mj.modules.bending import BendingSpec, bending_module
 from tca_mj.sim import Simulation
+from tca_mj.tca import Supply
 
 TCAS = 3
 PERIOD = 0.1  # time between two updates of the TCAs [s]
@@ -46,7 +49,10 @@ class StaticTip:
         """
         if spec.count != TCAS:
             raise ValueError(f"module_spec must have {TCAS} TCAs, got {spec.count}")
-        self.sim = Simulation(hanging_module(spec), timestep=timestep, tca_period=PERIOD)
+        self.sim = Simulation(
+            hang(bending_module(spec), CLAMP.tolist(), _DOWN, "reach_stand"),
+            timestep=timestep, tca_period=PERIOD,
+        )  # fmt: skip
         self._tip = int(self.sim.model.site("bench.module.tip").id)
 
     def locate(self) -> None:
@@ -83,9 +89,13 @@ class StaticTip:
         temperature = np.array(temperature, dtype=np.float64)
         sim.reset()
         power = sim.keep(temperature)
-        sim.step(power, _RESTING - PERIOD)
-        before = self.tip()
-        sim.step(power, PERIOD)
+        given, sim.bank.supply = sim.bank.supply, Supply()  # a task may command temperatures
+        try:
+            sim.step(power, _RESTING - PERIOD)
+            before = self.tip()
+            sim.step(power, PERIOD)
+        finally:
+            sim.bank.supply = given
         moved = float(np.linalg.norm(self.tip() - before))
         if moved > _AT_REST:
             raise NoRest(f"the tip moves {moved:.2g} m in {PERIOD} s at {temperature} °C")
@@ -138,10 +148,16 @@ class StaticTip:
         )
 
 
-def hanging_module(spec: BendingSpec) -> Part:
-    """The scene: the module, named ``module``, hangs from a stand; with the target's mark."""
-    mjspec = new_spec("reach")
-    mjspec.worldbody.add_site(name="clamp", pos=list(CLAMP), quat=list(_DOWN), group=4)
-    robot = Part(mjspec)
-    robot.attach(bending_module(spec), to="clamp", prefix="module")
-    return scene(mjcf("arena.xml"), robot, {"stand": mjcf("reach_stand.xml")}, name="bench")
+def hang(module: Part, place: Sequence[float], turn: Sequence[float], stand: str) -> Part:
+    """A scene in which ``module``, of that name, hangs from a stand.
+
+    Args:
+        module: What hangs.
+        place: Where its base is [m].
+        turn: Turn of its base, a quaternion wxyz.
+        stand: Name of the MJCF file of the stand.
+    """
+    robot = Part(new_spec("bench"))
+    robot.spec.worldbody.add_site(name="clamp", pos=place, quat=turn, group=4)
+    robot.attach(module, to="clamp", prefix="module")
+    return scene(mjcf("arena.xml"), robot, {"stand": mjcf(f"{stand}.xml")}, name="bench")

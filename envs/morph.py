@@ -2,43 +2,40 @@
 
 import math
 from functools import partial
-from typing import Any
+from typing import Any, Unpack
 
 import mujoco
 import numpy as np
 from dm_control.utils import rewards
 from numpy.typing import ArrayLike, NDArray
 
-from tca_mj.assets import mjcf
+from tca_mj.envs.hanging import hang
 from tca_mj.envs.options import Option, Options, Setup, Uniform, variation_options
 from tca_mj.envs.table import Entry, Table
-from tca_mj.envs.task import SimulatedTask, Verdict
+from tca_mj.envs.task import SimulatedTask, TaskArguments, Verdict
 from tca_mj.envs.vector import TaskVector
-from tca_mj.model.part import Part, new_spec
-from tca_mj.model.scene import scene
+from tca_mj.model.part import Part
 from tca_mj.modules.morphing import MorphingSpec, morphing_module
-from tca_mj.render import colour_tendons
+from tca_mj.record.render import colour_tendons
 from tca_mj.sim import Drive, Simulation
-
-CAMERAS = ("front", "side")
 
 OBSERVATION = Table(
     [
-        Entry("spine temperature", 1, -50.0, 400.0, "°C"),
-        Entry("TCA temperature", 1, -50.0, 300.0, "°C"),
-        Entry("TCA length", 1, 0.1, 0.5, "m"),
-        Entry("TCA resistance", 1, 0.0, 40.0, "ohm"),
-        Entry("TCA tension", 1, 0.0, 5.0, "N"),
-        Entry("angle", 1, -7.0, 7.0, "rad"),
-        Entry("angular velocity", 1, -200.0, 200.0, "rad/s"),
-        Entry("commanded angle", 1, 0.0, 4.0, "rad"),
+        Entry("spine temperature", 1, -50.0, 400.0, "°C", centre=70.0, scale=50.0),
+        Entry("TCA temperature", 1, -50.0, 300.0, "°C", centre=100.0, scale=75.0),
+        Entry("TCA length", 1, 0.0, 1.0, "m", centre=0.22, scale=0.01),
+        Entry("TCA resistance", 1, 0.0, 40.0, "ohm", centre=15.7, scale=0.3),
+        Entry("TCA tension", 1, 0.0, 5.0, "N", centre=0.2, scale=0.2),
+        Entry("angle", 1, -7.0, 7.0, "rad", centre=1.6, scale=1.6),
+        Entry("angular velocity", 1, -200.0, 200.0, "rad/s", scale=1.0),
+        Entry("commanded angle", 1, 0.0, 4.0, "rad", centre=1.6, scale=1.6),
         Entry("time at the goal", 1, 0.0, 3.0, "s"),
     ]
 )
 ACTION = Table(
     [
         Entry("heater voltage", 1, -1.0, 1.0, "-", off=-1.0),
-        Entry("TCA power", 1, -1.0, 1.0, "-", off=-1.0),
+        Entry("TCA heating", 1, -1.0, 1.0, "-", off=-1.0),
         Entry("fan", 1, -1.0, 1.0, "on above 0"),
     ]
 )
@@ -63,7 +60,7 @@ class MorphModule(SimulatedTask):
 
     Action, shape (3,), all in [-1, 1]:
         0: voltage of the heater; -1 is off, 1 is ``max_voltage``, linear in between.
-        1: power of the TCA; -1 is off, 1 is ``max_power``, linear in between.
+        1: temperature to hold, or power, of the TCA; see ``SimulatedTask``.
         2: fan; it blows above 0.
 
     Observation, shape (9,): see ``OBSERVATION``, whose rows have units and bounds. The angle is
@@ -91,50 +88,55 @@ class MorphModule(SimulatedTask):
 
     max_voltage = 25.0  # Sun, Section 6.1.3 [V]
     max_power = 40.0  # about 25 V at the TCA, Sun, Section 6.2.1 [W]
+    response = 0.2  # twice the time between two updates, in which 40 W are 30 K; estimate [s]
     max_temperature = 180.0  # annealing temperature of the TCA, Sun, Table 2.1 [°C]
     max_spine_temperature = 160.0  # an estimate, as in ``MorphSequence`` [°C]
-    control_period = 0.1  # [s]
     tolerance = math.radians(3.0)  # Sun, Section 6.2.1, calls this steady [rad]
     hold_time = 3.0  # time at the goal [s]
     start_range = (0.0, math.pi)
     target_range = (math.radians(30.0), math.pi)
     terms = ("reach", "fix", "goal", "energy", "damage")
     energy_price = 0.01
+    camera_prefix = "stand."
     scripted = "tca_mj.agents.morph:scripted"
+    scripted_arguments = {"action": "power"}
     robot_argument = ("module_spec", _default)
 
     def __init__(
         self,
         *,
-        render_mode: str | None = None,
         module_spec: MorphingSpec | None = None,
         timestep: float = 5e-3,
-        camera: str = "front",
-        size: tuple[int, int] = (960, 720),
+        **common: Unpack[TaskArguments],
     ) -> None:
         """Builds the scene.
 
         Args:
-            render_mode: None or ``"rgb_array"``.
             module_spec: The module, by default the published one, bending in its plane only.
             timestep: Physics time step, a whole fraction of ``control_period``, in which the TCA
                 and the spine are updated once [s].
-            camera: Camera of the pictures: ``front`` or ``side``.
-            size: Width and height of the pictures [pixels].
+            **common: See ``TaskArguments``.
 
         Raises:
             ValueError: If an argument is out of range or the module cannot be built.
         """
-        self._look(render_mode, camera, size, cameras=CAMERAS, prefix="stand.")
-        steps = self.control_period / timestep if timestep > 0.0 else 0.0
+        own = type(self).control_period
+        steps = own / timestep if timestep > 0.0 else 0.0
         if not (np.isfinite(steps) and steps > 0.5 and abs(steps - round(steps)) < 1e-9):
             raise ValueError(
-                f"timestep must be {self.control_period} s over a whole number, got {timestep}"
+                f"timestep must be {own} s over a whole number, got {timestep}"
             )
         self.module_spec = module_spec or _default()
         part = hanging_module(self.module_spec)
-        sim = Simulation(part, timestep=timestep, tca_period=self.control_period)
-        self._open(sim, OBSERVATION, ACTION, self._options())
+        sim = Simulation(part, timestep=timestep, tca_period=own)
+        longest = float(sim.bank.longest.max())
+        seen = OBSERVATION.covering(
+            {
+                "TCA length": (0.0, longest),
+                "TCA resistance": (0.0, 2.0 * float(sim.resistance.max())),
+            }
+        )
+        self._open(sim, seen, ACTION, self._options(), **common)
         self.target = self.target_range[1]
         self._at_goal = 0
         self._find(self.model, part)
@@ -198,20 +200,20 @@ class MorphModule(SimulatedTask):
         self._progress = self._measure()
 
     def drive(self, command: NDArray[np.float64]) -> Drive:
-        """Voltage of the heater, power of the TCA, and the fan; see the class."""
+        """Voltage of the heater, what the TCA is told, and the fan; see the class."""
         share = (command + 1.0) / 2.0
         return Drive(
-            power=self.max_power * share[1:2],
+            command=self.heated(command[1:2]),
             voltage=self.max_voltage * share[0],
             fan=bool(command[2] > 0.0),
         )
 
     def judge(self, drive: Drive, harmed: bool) -> Verdict:
         """How near the goal is, and how long the module has been there."""
-        off = not (drive.power.any() or drive.voltage or drive.fan)
+        off = not (self.sim.power.any() or drive.voltage or drive.fan)
         before, self._progress = self._progress, self._measure()
         self._at_goal = self._at_goal + 1 if off and self._fixed() else 0
-        held = self._at_goal * self.control_period
+        held = self._at_goal * self.interval
         success = held > self.hold_time - 1e-9 and not harmed
         terms = {name: value - before[name] for name, value in self._progress.items()}
         terms["goal"] = 20.0 if success else 0.0
@@ -256,7 +258,7 @@ class MorphModule(SimulatedTask):
             "angle": self.angle,
             "angular velocity": float(np.sum(self.data.qvel[self._bend_v])),
             "commanded angle": self.target,
-            "time at the goal": min(self._at_goal * self.control_period, self.hold_time),
+            "time at the goal": min(self._at_goal * self.interval, self.hold_time),
         }
 
     def harm(self) -> str | None:
@@ -284,12 +286,8 @@ class MorphModule(SimulatedTask):
 
 
 def hanging_module(spec: MorphingSpec) -> Part:
-    """The scene: the module, named ``module``, hangs from a stand and bends in the x-z plane."""
-    mjspec = new_spec("morph")
-    mjspec.worldbody.add_site(name="clamp", pos=list(_CLAMP), quat=list(_HANGING), group=4)
-    robot = Part(mjspec)
-    robot.attach(morphing_module(spec), to="clamp", prefix="module")
-    return scene(mjcf("arena.xml"), robot, {"stand": mjcf("morph_stand.xml")}, name="bench")
+    """The scene: the module hangs from a stand and bends in the x-z plane."""
+    return hang(morphing_module(spec), _CLAMP, _HANGING, "morph_stand")
 
 
 MorphModuleVector = partial(TaskVector, MorphModule)

@@ -1,7 +1,7 @@
 """``TCA/BendReach-v0``: three TCAs bring the tip of a soft module to a point (Sun, 4.1.3)."""
 
 from functools import partial
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Unpack
 
 import mujoco
 import numpy as np
@@ -10,25 +10,25 @@ from numpy.typing import ArrayLike, NDArray
 from tca_mj.envs.hanging import CLAMP, PERIOD, TCAS, NoRest, StaticTip
 from tca_mj.envs.options import Constant, Option, Options, Setup, variation_options
 from tca_mj.envs.table import Entry, Table
-from tca_mj.envs.task import SimulatedTask, Verdict
+from tca_mj.envs.task import SimulatedTask, TaskArguments, Verdict
 from tca_mj.envs.vector import TaskVector
 from tca_mj.modules.bending import BendingSpec
 from tca_mj.sim import Drive, SimulationDiverged
 
-CAMERAS = ("front", "side")
+_SIDES = (1, 3, 2)  # TCAs, left and right of the x-z plane swapped
 
 OBSERVATION = Table(
     [
-        Entry("TCA temperature", TCAS, -50.0, 300.0, "°C"),
-        Entry("TCA length", TCAS, 0.0, 0.15, "m"),
-        Entry("TCA tension", TCAS, 0.0, 5.0, "N"),
-        Entry("tip position", 3, -0.1, 0.1, "m"),
-        Entry("tip velocity", 3, -10.0, 10.0, "m/s"),
-        Entry("target position", 3, -0.1, 0.1, "m"),
+        Entry("TCA temperature", TCAS, -50.0, 300.0, "°C", centre=80.0, scale=60.0, mirror=_SIDES),
+        Entry("TCA length", TCAS, 0.0, 0.2, "m", centre=0.045, scale=0.01, mirror=_SIDES),
+        Entry("TCA tension", TCAS, 0.0, 5.0, "N", centre=0.2, scale=0.2, mirror=_SIDES),
+        Entry("tip position", 3, -0.2, 0.2, "m", scale=0.03, mirror=(1, -2, 3)),
+        Entry("tip velocity", 3, -10.0, 10.0, "m/s", scale=0.05, mirror=(1, -2, 3)),
+        Entry("target position", 3, -0.2, 0.2, "m", scale=0.03, mirror=(1, -2, 3)),
         Entry("time at the target", 1, 0.0, 1.0, "s"),
     ]
 )
-ACTION = Table([Entry("TCA power", TCAS, -1.0, 1.0, "-", off=-1.0)])
+ACTION = Table([Entry("TCA heating", TCAS, -1.0, 1.0, "-", off=-1.0, mirror=_SIDES)])
 
 _SETTLING = 0.5  # time in which the cold module comes to rest [s]
 _SHRINK = 0.8  # rise of temperature is cut to this share until the module comes to rest
@@ -61,9 +61,9 @@ _OPTIONS = Options(
 class BendReach(SimulatedTask):
     """Bring the tip of a hanging bending module to a point, and keep it there.
 
-    Action, shape (3,), all in [-1, 1]: power of the TCAs ``tca0`` to ``tca2``, which bend the
-    module to x and to 120° and 240° from there, clockwise seen from above; -1 is off, 1 is
-    ``max_power``, linear in between.
+    Action, shape (3,), all in [-1, 1]: temperature to hold, or power, of the TCAs ``tca0`` to
+    ``tca2``, which bend the module to x and to 120° and 240° from there, clockwise seen from above;
+    see ``SimulatedTask``.
 
     Observation, shape (19,): see ``OBSERVATION``, whose rows have units and bounds. Positions are
     from the clamp, with the axes of the world: z up, so that the cold tip is at z = -45 mm.
@@ -72,7 +72,7 @@ class BendReach(SimulatedTask):
         reach: What the distance between tip and target has shrunk by, over 3 mm.
         goal: 10 in the step in which the tip has been within 3 mm of the target for 1 s.
         energy: Minus 0.02 per joule of electrical energy.
-        heat: Minus 0.002 for every kelvin by which a TCA is above ``hot_temperature``.
+        heat: Minus 0.002 for every kelvin by which a TCA is above ``hot_temperature``, every 0.1 s.
         end: Minus 5 in the step in which a TCA is too hot or torn.
 
     The first is a difference: staying somewhere and shaking earn nothing.
@@ -90,40 +90,47 @@ class BendReach(SimulatedTask):
     max_temperature: ClassVar[float] = 180.0  # annealing temperature, Sun, Table 2.1 [°C]
     hot_temperature: ClassVar[float] = 140.0  # 20 K below where the module may not rest [°C]
     hottest_target: ClassVar[float] = 130.0  # of a TCA, at rest at the target [°C]
-    control_period: ClassVar[float] = PERIOD  # [s]
+    safe_temperature: ClassVar[float] = 140.0  # [°C]
+    control_period = PERIOD  # [s]
     tolerance: ClassVar[float] = 3e-3  # [m]
     hold_time: ClassVar[float] = 1.0  # time at the target [s]
     terms = ("reach", "goal", "energy", "heat", "end")
     energy_price, heat_price, end_price = 0.02, 0.002, 5.0
+    camera_prefix = "stand."
     scripted = "tca_mj.agents.reach:scripted"
+    scripted_arguments = {"action": "power"}
     robot_argument = ("module_spec", BendingSpec)
     learning_steps = {"ppo": 60_000, "sac": 60_000}
+    learning_arguments = {"action": "power"}
 
     def __init__(
         self,
         *,
-        render_mode: str | None = None,
         module_spec: BendingSpec | None = None,
         timestep: float = 5e-3,
-        camera: str = "front",
-        size: tuple[int, int] = (960, 720),
+        **common: Unpack[TaskArguments],
     ) -> None:
         """Builds the scene.
 
         Args:
-            render_mode: None or ``"rgb_array"``.
             module_spec: The module, by default the published one; with three TCAs.
             timestep: Physics time step, of which ``control_period`` is a multiple [s].
-            camera: Camera of the pictures: ``front`` or ``side``.
-            size: Width and height of the pictures [pixels].
+            **common: See ``TaskArguments``.
 
         Raises:
             ValueError: If an argument is unknown or out of range, or the module cannot be built.
         """
-        self._look(render_mode, camera, size, cameras=CAMERAS, prefix="stand.")
         self.module_spec = module_spec or BendingSpec()
         self.static = StaticTip(self.module_spec, timestep=timestep)
-        self._open(self.static.sim, OBSERVATION, ACTION, _OPTIONS)
+        longest = float(self.static.sim.bank.longest.max())
+        size = max(longest, 1.5 * self.module_spec.length)
+        seen = OBSERVATION.covering(
+            {
+                "TCA length": (0.0, longest), "tip position": (-size, size),
+                "target position": (-size, size),
+            }
+        )  # fmt: skip
+        self._open(self.static.sim, seen, ACTION, _OPTIONS, **common)
         self._mocap = int(self.model.body("stand.target").mocapid[0])
         self.target = np.zeros(3)
         self.target_temperature = self.sim.temperature.copy()
@@ -179,8 +186,8 @@ class BendReach(SimulatedTask):
         return min(self.hottest_target, float(np.min(kept)))
 
     def drive(self, command: NDArray[np.float64]) -> Drive:
-        """Power of the TCAs; see the class."""
-        return Drive(power=self.max_power * (command + 1.0) / 2.0)
+        """What the TCAs are told; see the class."""
+        return Drive(command=self.heated(command))
 
     def judge(self, drive: Drive, harmed: bool) -> Verdict:
         """How far the tip is from the target, and how long it has been there."""
@@ -199,7 +206,7 @@ class BendReach(SimulatedTask):
     @property
     def _held(self) -> float:
         """Time at the target [s]."""
-        return self._at_target * self.control_period
+        return self._at_target * self.interval
 
     def _gap(self) -> float:
         """Distance of tip and target [m]."""

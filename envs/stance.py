@@ -36,7 +36,7 @@ BODIES = ("rigid", "elastic", "fine")
 # in a thinner one than this, feet that land fall through it. What that and the other numbers do to
 # speeds is in docs/tetrapod.md, by scripts/tetrapod_contacts.py.
 _MARGIN, _IMPEDANCE = 0.2e-3, (0.1, 0.99, 0.3e-3, 0.5, 2.0)
-_REST_TIME = 10e-3  # time constant of coming to rest, two time steps, MuJoCo's least [s]
+_REST_TIME = 10e-3  # time constant of coming to rest; two time steps, MuJoCo's least, if more [s]
 # The ratio keeps splayed legs from creeping apart: 0.04 mm in 20 s, 7 mm at a ratio of 10.
 _IMPEDANCE_RATIO = 3000.0
 
@@ -78,7 +78,7 @@ def tetrapod_scene(
     else:
         robot = tetrapod(spec) if body == "elastic" else rigid_tetrapod(spec, bend=bend)
     part = scene(arena, robot, objects, name="robot")
-    _soften(part)
+    _soften(part, max(_REST_TIME, 2.0 * timestep))
     if body == "fine":  # its welds are harder than MuJoCo takes them otherwise
         part.spec.option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_REFSAFE)
     hub = part.spec.body("robot.hub")
@@ -99,14 +99,14 @@ def _looking(place: Sequence[float], towards: Sequence[float]) -> Array:
     return turn
 
 
-def _soften(part: Part) -> None:
+def _soften(part: Part, rest_time: float) -> None:
     option = part.spec.option
     option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
     option.impratio = _IMPEDANCE_RATIO
     option.jacobian = mujoco.mjtJacobian.mjJAC_SPARSE  # four legs apart: two thirds of the time
     for geom in part.spec.geoms:
         if geom.priority > 0:  # the robot's: they decide on every contact
-            geom.margin, geom.solimp, geom.solref = _MARGIN, _IMPEDANCE, (_REST_TIME, 1.0)
+            geom.margin, geom.solimp, geom.solref = _MARGIN, _IMPEDANCE, (rest_time, 1.0)
 
 
 class Stance:

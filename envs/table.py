@@ -1,7 +1,7 @@
 """Spaces as tables: every entry of an observation or action with its name, bounds and unit."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -20,6 +20,10 @@ class Entry:
         high: Upper bound.
         unit: Unit, ``-`` for none.
         off: Of an action, what leaves the robot alone; None for the middle of the bounds.
+        centre: What is scaled to 0, the same for left and right.
+        scale: How far from there is scaled to 1; None for half the way between the bounds.
+        mirror: Where each number comes from in the mirror that swaps left and right: a place in
+            the row, from 1, negative if the sign changes; empty if nothing does.
     """
 
     name: str
@@ -28,6 +32,16 @@ class Entry:
     high: float
     unit: str
     off: float | None = None
+    centre: float = 0.0
+    scale: float | None = None
+    mirror: tuple[int, ...] = ()
+
+    def __post_init__(self) -> None:
+        if self.mirror and sorted(abs(k) for k in self.mirror) != list(range(1, self.size + 1)):
+            raise ValueError(
+                f"mirror must name each of the {self.size} places of {self.name} once,"
+                f" got {self.mirror}"
+            )
 
 
 class Table:
@@ -37,6 +51,7 @@ class Table:
         entries: The rows.
         slices: Where each row lies in the array.
         size: Length of the array.
+        symmetric: Whether it says what a mirror makes of it.
     """
 
     def __init__(self, entries: Sequence[Entry]) -> None:
@@ -50,11 +65,49 @@ class Table:
         sizes = [entry.size for entry in self.entries]
         self._low = np.repeat([e.low for e in self.entries], sizes).astype(np.float32)
         self._high = np.repeat([e.high for e in self.entries], sizes).astype(np.float32)
+        scales = [(e.high - e.low) / 2.0 if e.scale is None else e.scale for e in self.entries]
+        self._scale = np.repeat(scales, sizes).astype(np.float32)
+        self._centre = np.repeat([e.centre for e in self.entries], sizes).astype(np.float32)
+        self.symmetric = any(entry.mirror for entry in self.entries)
+        places = [
+            (self.slices[e.name].start, k) for e in self.entries
+            for k in (e.mirror or range(1, e.size + 1))
+        ]  # fmt: skip
+        self._source = np.array([start + abs(k) - 1 for start, k in places], dtype=np.int64)
+        self._sign = np.array([np.sign(k) for _, k in places], dtype=np.float32)
+
+    def covering(self, bounds: Mapping[str, tuple[float, float]]) -> "Table":
+        """The table with rows that reach at least as far as the given bounds, by name."""
+        wider = (
+            replace(e, low=min(e.low, bounds[e.name][0]), high=max(e.high, bounds[e.name][1]))
+            if e.name in bounds else e
+            for e in self.entries
+        )  # fmt: skip
+        return Table(tuple(wider))
+
+    def scaled(self, array: NDArray[Any]) -> NDArray[np.float32]:
+        """Every number by its row's centre and scale, shape (..., size), of the order of 1."""
+        return ((array - self._centre) / self._scale).astype(np.float32)
+
+    def mirrored(self, array: NDArray[Any]) -> NDArray[Any]:
+        """What a mirror that swaps left and right makes of an array, shape (..., size).
+
+        Raises:
+            ValueError: If no row says how.
+        """
+        if not self.symmetric:
+            raise ValueError("the table must have a mirror in one of its rows, got none")
+        return array[..., self._source] * self._sign
 
     @property
     def space(self) -> Any:
         """The table as a Gymnasium ``Box`` of float32."""
         return Box(self._low, self._high, dtype=np.float32)
+
+    @property
+    def scaled_space(self) -> Any:
+        """The same of what ``scaled`` makes of it."""
+        return Box(self.scaled(self._low), self.scaled(self._high), dtype=np.float32)
 
     @property
     def still(self) -> NDArray[np.float32]:
@@ -94,13 +147,16 @@ class Table:
 
     def markdown(self) -> str:
         """The table as Markdown, for the documentation."""
-        lines = ["| index | entry | low | high | unit |", "|---|---|---|---|---|"]
+        lines = ["| index | entry | low | high | unit | scale |", "|---|---|---|---|---|---|"]
         for entry in self.entries:
             where = self.slices[entry.name]
             last = where.stop - 1
             index = f"{where.start}" if entry.size == 1 else f"{where.start}-{last}"
+            scale = float(self._scale[where.start])
+            about = f"{entry.centre:g} ± {scale:g}" if entry.centre else f"± {scale:g}"
             lines.append(
                 f"| {index} | {entry.name} | {entry.low:g} | {entry.high:g} | {entry.unit} |"
+                f" {about} |"
             )
         return "\n".join(lines)
 

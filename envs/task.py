@@ -1,23 +1,24 @@
 """What all tasks share: the course of an episode, how tools reach it, and its picture."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from copy import deepcopy
 from dataclasses import asdict, dataclass, field
-from typing import Any, ClassVar
+from typing import Any, ClassVar, TypedDict
 
 import gymnasium as gym
 import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from tca_mj.checks import number
 from tca_mj.envs.options import Options, Setup, variation_of
 from tca_mj.envs.table import Table, numbers
-from tca_mj.render import Offscreen, colour_tendons
+from tca_mj.record.render import Offscreen, colour_tendons
 from tca_mj.sim import Drive, Simulation, SimulationDiverged, SimulationOverheated
 from tca_mj.state import SimulationState, get_state, set_state
-from tca_mj.tca import HeatSpec
-from tca_mj.variation import Nominal, Variation
+from tca_mj.tca import HeatSpec, Supply, Thermostat
+from tca_mj.variation import AMBIENT, Nominal, Variation
 
 Observation = NDArray[np.float32]
 Action = NDArray[np.float32]
@@ -76,7 +77,30 @@ class TaskState:
 
 # What of a task may change in an episode has one of these types; and what never does, by name.
 _VALUES = (bool, int, float, str, tuple, dict, np.ndarray, np.generic)
-_BUILT = ("render_mode", "_camera", "_size", "spec", "metadata")
+_BUILT = (
+    "render_mode", "_camera", "_size", "spec", "metadata",
+    "heating", "control_period", "interval", "repeats", "share",
+)  # fmt: skip
+HEATINGS = ("temperature", "power")
+
+
+class TaskArguments(TypedDict, total=False):
+    """Arguments that every task takes, besides its own.
+
+    Attributes:
+        action: What the TCAs are told, ``temperature`` (by default) or ``power``.
+        control_period: Time of a step, a multiple of the time between two updates of the TCAs; by
+            default the class's [s].
+        render_mode: None or ``"rgb_array"``.
+        camera: Camera of the pictures, one of the class's ``cameras``; by default the first.
+        size: Width and height of the pictures, by default 960 by 720 [pixels].
+    """
+
+    action: str
+    control_period: float | None
+    render_mode: str | None
+    camera: str
+    size: tuple[int, int]
 
 
 class SimulatedTask(gym.Env[Observation, Action], ABC):
@@ -88,6 +112,14 @@ class SimulatedTask(gym.Env[Observation, Action], ABC):
     off, is something seen out of its bounds, is a TCA damaged (``harm``), what has been earned and
     is the episode over (``judge``). A vector environment calls begin and finish for each of its
     tasks and lets all simulations run between them.
+
+    The row "TCA heating" of an action says, from -1 to 1, with ``action="temperature"`` which
+    temperature a thermostat holds each TCA at until the next action, from that of the surroundings
+    (25 °C; off) to ``safe_temperature``; with ``action="power"`` its power, from 0 to
+    ``max_power``.
+
+    A step may take longer than the task's own control period: it is then several of them with one
+    action, whose rewards add up, or as much of them as there is until the episode ends.
 
     Reward: the heir's terms, and ``energy``, minus ``energy_price`` per joule of electrical energy;
     ``heat``, minus ``heat_price`` per kelvin by which a TCA is above ``hot_temperature``, and
@@ -107,12 +139,21 @@ class SimulatedTask(gym.Env[Observation, Action], ABC):
         observation: Table of what is seen.
         action: Table of what is done.
         options: Table of the options of ``reset``.
+        cameras: Names of the cameras, behind ``camera_prefix``.
+        heating: What the TCAs are told, one of ``HEATINGS``.
         control_period: Time of one step [s].
+        interval: Time after which the task judges, a part of it [s].
+        max_power: Largest power of the TCAs that an action drives, one number or one for each [W].
+        safe_temperature: Highest temperature that an action can ask for [°C].
+        response: Time in which the thermostats would make up for an error; None for that between
+            two updates of the TCAs. They know the nominal heat loss: on a robot that loses more or
+            less they are off, the less the faster they are [s].
         max_temperature: Temperature that ends an episode [°C].
         hot_temperature: Temperature from which on heat is charged [°C].
         terms: Names of the terms of the reward.
         scripted: ``module:callable`` that makes its scripted policy from the task, or such a
             callable.
+        scripted_arguments: Arguments of ``__init__`` that its scripted policy needs.
         robot_argument: Argument of ``__init__`` that is the robot's specification, and what makes
             the default one; None if it has none.
         legs: Legs, each with the same TCAs, that a gait can drive; 0 if none can.
@@ -120,12 +161,18 @@ class SimulatedTask(gym.Env[Observation, Action], ABC):
         published_speed: Speeds of the real robot by the stage that shows them [m/s].
         learning_steps: Steps by algorithm after which the task was learned.
         learning_options: Options of every reset in training.
+        learning_arguments: Arguments of ``__init__`` in training.
         finer: Finer models of the robot by name: each turns the specification into arguments of
             ``__init__``, the finer specification among them.
     """
 
     metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 10}
-    control_period: ClassVar[float] = 0.1
+    cameras: ClassVar[tuple[str, ...]] = ("front", "side")
+    camera_prefix: ClassVar[str] = ""
+    control_period: float = 0.1
+    max_power: ClassVar[float | NDArray[np.float64]]
+    safe_temperature: ClassVar[float] = 172.0
+    response: ClassVar[float | None] = None
     max_temperature: ClassVar[float] = 180.0
     hot_temperature: ClassVar[float] = np.inf
     terms: ClassVar[tuple[str, ...]] = ("energy",)
@@ -133,6 +180,7 @@ class SimulatedTask(gym.Env[Observation, Action], ABC):
     heat_price: ClassVar[float] = 0.0
     end_price: ClassVar[float] = 0.0
     scripted: ClassVar[str | Callable[[Any], Any] | None] = None
+    scripted_arguments: ClassVar[Mapping[str, Any]] = {}
     robot_argument: ClassVar[tuple[str, Callable[[], Any]] | None] = None
     finer: ClassVar[Mapping[str, Callable[[Any], dict[str, Any]]]] = {}
 
@@ -141,48 +189,87 @@ class SimulatedTask(gym.Env[Observation, Action], ABC):
     published_speed: ClassVar[Mapping[str, float]] = {}
     learning_steps: ClassVar[Mapping[str, int]] = {}
     learning_options: ClassVar[Mapping[str, float]] = {}
+    learning_arguments: ClassVar[Mapping[str, Any]] = {}
 
     sim: Simulation
     observation: Table
     action: Table
     options: Options
+    heating: str
+    interval: float
     render_mode: str | None
     _camera: str
     _size: tuple[int, int]
     _screen: Offscreen | None = None
 
-    def _open(self, sim: Simulation, observation: Table, action: Table, options: Options) -> None:
-        """Takes what the task is made of; to be called once by ``__init__``."""
-        self.sim = sim
-        self.observation, self.action, self.options = observation, action, options
-        self.observation_space, self.action_space = observation.space, action.space
+    def _open(
+        self,
+        sim: Simulation,
+        observation: Table,
+        commands: Table,
+        options: Options,
+        *,
+        action: str = HEATINGS[0],
+        control_period: float | None = None,
+        render_mode: str | None = None,
+        camera: str | None = None,
+        size: tuple[int, int] = (960, 720),
+    ) -> None:
+        """Takes what the task is made of, and ``TaskArguments``; to be called once by ``__init__``.
+
+        Raises:
+            ValueError: If an argument is unknown or out of range, or the control period no multiple
+                of the time between two updates of the TCAs.
+        """
+        modes, heating = self.metadata["render_modes"], action
+        if render_mode not in (None, *modes):
+            raise ValueError(f"render_mode must be None or one of {modes}, got {render_mode!r}")
+        if camera not in (None, *self.cameras):
+            raise ValueError(f"camera must be one of {list(self.cameras)}, got {camera!r}")
+        if numbers("size", size, (2,)).min() < 1.0:
+            raise ValueError(f"size must be at least 1 pixel each way, got {size}")
+        self.render_mode, self._size = render_mode, size
+        self._camera = self.camera_prefix + (camera or self.cameras[0])
+        if heating not in HEATINGS:
+            raise ValueError(f"action must be one of {list(HEATINGS)}, got {heating!r}")
+        self.sim, self.heating = sim, heating
+        self.observation, self.action, self.options = observation, commands, options
+        self.observation_space, self.action_space = observation.space, commands.space
         self._nominal = Nominal(sim)
         self._varied: dict[str, float] = asdict(self.variation)
         self._used = 0.0
+        own, asked = type(self).control_period, control_period
+        self.control_period = own if asked is None else number("control_period", asked, above=0.0)
+        self.interval = own if _divides(own, self.control_period) else sim.tca_period
+        if not _divides(self.interval, self.control_period):
+            raise ValueError(
+                f"control_period must be a multiple of {sim.tca_period} s, the time between two"
+                f" updates of the TCAs, got {asked}"
+            )
+        self.repeats = round(self.control_period / self.interval)
+        self.share = self.interval / own  # of a price per step that each judgement takes
+        self.metadata = {**self.metadata, "render_fps": max(1, round(1.0 / self.control_period))}
+        if heating == "temperature":
+            row = commands.slices["TCA heating"]
+            power = np.ones(sim.n)  # those that no action drives are off
+            power[: row.stop - row.start] = self.max_power
+            thermostat = Thermostat(
+                heat=self.heat, max_power=power, max_temperature=self.safe_temperature,
+                response=self.response or sim.tca_period,
+            )  # fmt: skip
+            sim.bank.supply = Supply(quantity="temperature", max_power=power, thermostat=thermostat)
 
-    def _look(
-        self,
-        render_mode: str | None,
-        camera: str,
-        size: tuple[int, int],
-        *,
-        cameras: Sequence[str],
-        prefix: str = "",
-    ) -> None:
-        """Keeps how the task is to be drawn: by ``camera``, one of ``cameras``.
+    def heated(self, command: NDArray[np.float64]) -> NDArray[np.float64]:
+        """What the simulation's TCAs are told by the row "TCA heating", shape (sim.n,).
 
-        Raises:
-            ValueError: If the mode or the camera is unknown, or the size below a pixel.
+        Args:
+            command: Of the first TCAs, from -1 to 1; the others are off.
         """
-        modes = self.metadata["render_modes"]
-        if render_mode not in (None, *modes):
-            raise ValueError(f"render_mode must be None or one of {modes}, got {render_mode!r}")
-        if camera not in cameras:
-            raise ValueError(f"camera must be one of {list(cameras)}, got {camera!r}")
-        if numbers("size", size, (2,)).min() < 1.0:
-            raise ValueError(f"size must be at least 1 pixel each way, got {size}")
-        self.render_mode = render_mode
-        self._camera, self._size = prefix + camera, size
+        warm = self.heating == "temperature"
+        low, high = (AMBIENT, self.safe_temperature) if warm else (0.0, self.max_power)
+        told = np.full(self.sim.n, low)
+        told[: command.size] += (high - low) * ((command + 1.0) / 2.0)
+        return told
 
     @abstractmethod
     def prepare(self, setup: Setup) -> None:
@@ -290,7 +377,7 @@ class SimulatedTask(gym.Env[Observation, Action], ABC):
                 observation[table.slices[name]] = value
             excess = np.maximum(sim.temperature - self.hot_temperature, 0.0)
             if self.heat_price:
-                terms["heat"] = -self.heat_price * float(np.sum(excess))
+                terms["heat"] = -self.heat_price * self.share * float(np.sum(excess))
             if self.hot_temperature < self.max_temperature:
                 cost = float(np.sum(excess)) / (self.max_temperature - self.hot_temperature)
             if self.end_price and (reason or ended):
@@ -383,18 +470,24 @@ class SimulatedTask(gym.Env[Observation, Action], ABC):
         return np.clip(command, -1.0, 1.0)
 
     def step(self, action: Action) -> Outcome:
-        """Runs the simulation for ``control_period``; see the class.
+        """Runs the simulation for ``control_period``, or until the episode ends; see the class.
 
         Raises:
             ValueError: If the action has the wrong shape, is not finite or out of [-1, 1].
         """
-        drive = self.begin(self.command(action))
-        error = None
-        try:
-            self.sim.step(drive.power, self.control_period, voltage=drive.voltage, fan=drive.fan)
-        except SimulationDiverged as diverged:
-            error = diverged
-        return self.finish(drive, error)
+        command, outcome = self.command(action), None
+        for _ in range(self.repeats):
+            drive = self.begin(command)
+            error = None
+            try:
+                self.sim.step(drive.command, self.interval, voltage=drive.voltage, fan=drive.fan)
+            except SimulationDiverged as diverged:
+                error = diverged
+            outcome = together(outcome, self.finish(drive, error))
+            if outcome[2] or outcome[3]:
+                break
+        assert outcome is not None
+        return outcome
 
     # What tools that know Gymnasium's own MuJoCo environments look for.
     @property
@@ -444,6 +537,23 @@ class SimulatedTask(gym.Env[Observation, Action], ABC):
         if self._screen is not None:
             self._screen.close()
             self._screen = None
+
+
+def together(before: Outcome | None, now: Outcome) -> Outcome:
+    """Outcome of two intervals of one step, the later of which is ``now``."""
+    if before is None:
+        return now
+    observation, _, terminated, truncated, info = now
+    earned = before[4]["reward_terms"]
+    terms = {name: earned[name] + term for name, term in info["reward_terms"].items()}
+    info |= {"reward_terms": terms, "cost": before[4]["cost"] + info["cost"]}
+    return observation, float(sum(terms.values())), terminated, truncated, info
+
+
+def _divides(part: float, whole: float) -> bool:
+    """Whether a time is a whole number of others."""
+    count = round(whole / part)
+    return count >= 1 and abs(count * part - whole) < 1e-9
 
 
 def broken_off(error: SimulationDiverged | None) -> str | None:

@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -12,27 +12,32 @@ from tca_mj.assets import mjcf
 from tca_mj.envs.options import Constant, Option, Options, Setup, Uniform, variation_options
 from tca_mj.envs.stance import CAMERAS, LEG_TCAS, Stance, tetrapod_scene
 from tca_mj.envs.table import Entry, Table
-from tca_mj.envs.task import Headway, SimulatedTask, TaskState, Verdict
+from tca_mj.envs.task import Headway, SimulatedTask, TaskArguments, TaskState, Verdict
 from tca_mj.envs.vector import TaskVector
 from tca_mj.robots.tetrapod import LEGS, TetrapodSpec
 from tca_mj.sim import Drive
 
+_SIDES = (4, 5, 6, 1, 2, 3, 10, 11, 12, 7, 8, 9)  # TCAs of the legs, left and right swapped
+_FEET = (4, -5, 6, 1, -2, 3, 10, -11, 12, 7, -8, 9)  # and the places of their feet
+
 OBSERVATION = Table(
     [
-        Entry("TCA temperature", LEG_TCAS, -50.0, 300.0, "°C"),
-        Entry("TCA length", LEG_TCAS, 0.0, 0.15, "m"),
-        Entry("TCA tension", LEG_TCAS, 0.0, 5.0, "N"),
-        Entry("orientation", 4, -1.0, 1.0, "quaternion wxyz"),
-        Entry("height", 1, -0.5, 0.5, "m"),
-        Entry("velocity", 3, -10.0, 10.0, "m/s"),
-        Entry("angular velocity", 3, -1000.0, 1000.0, "rad/s"),
-        Entry("foot position", 12, -0.5, 0.5, "m"),
-        Entry("leg contact", 4, 0.0, 1.0, "1 if foot or plates touch something"),
+        Entry("TCA temperature", LEG_TCAS, -50.0, 300.0, "°C", centre=100.0, scale=75.0,
+              mirror=_SIDES),
+        Entry("TCA length", LEG_TCAS, 0.0, 0.3, "m", centre=0.04, scale=0.01, mirror=_SIDES),
+        Entry("TCA tension", LEG_TCAS, 0.0, 5.0, "N", centre=0.2, scale=0.2, mirror=_SIDES),
+        Entry("orientation", 4, -1.0, 1.0, "quaternion wxyz", mirror=(1, -2, 3, -4)),
+        Entry("height", 1, -0.7, 0.7, "m", centre=0.03, scale=0.03),
+        Entry("velocity", 3, -10.0, 10.0, "m/s", scale=0.05, mirror=(1, -2, 3)),
+        Entry("angular velocity", 3, -1000.0, 1000.0, "rad/s", scale=1.0, mirror=(-1, 2, -3)),
+        Entry("foot position", 12, -0.7, 0.7, "m", scale=0.1, mirror=_FEET),
+        Entry("leg contact", 4, 0.0, 1.0, "1 if foot or plates touch something", centre=0.5,
+              mirror=(2, 1, 4, 3)),
         Entry("body bend", 1, -6.3, 6.3, "rad"),
-        Entry("commanded direction", 2, -1.0, 1.0, "-"),
+        Entry("commanded direction", 2, -1.0, 1.0, "-", mirror=(1, -2)),
     ]
-)
-ACTION = Table([Entry("TCA power", LEG_TCAS, -1.0, 1.0, "-", off=-1.0)])
+)  # fmt: skip
+ACTION = Table([Entry("TCA heating", LEG_TCAS, -1.0, 1.0, "-", off=-1.0, mirror=_SIDES)])
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -87,9 +92,10 @@ class TetrapodGait(SimulatedTask):
     a beam that its U-shaped body and its legs embrace. It senses its TCAs, its own motion and
     which legs touch; it acts by heating the three TCAs of each leg.
 
-    Action, shape (12,), all in [-1, 1]: power of the TCAs ``tca0`` (lifts), ``tca1`` (front, down)
-    and ``tca2`` (rear, down) of the legs front left, front right, rear left and rear right; -1 is
-    off, 1 is ``max_power``, linear in between.
+    Action, shape (12,), all in [-1, 1]: temperature to hold, or power, of the TCAs ``tca0``
+    (lifts), ``tca1`` (front, down) and ``tca2`` (rear, down) of the legs front left, front right,
+    rear left and rear right; see ``SimulatedTask``. Left and right are mirror images, which the
+    tables say.
 
     Observation, shape (66,): see ``OBSERVATION``, whose rows have units and bounds. Orientation is
     that of the hub, the middle of the spines, in the world, with a first number that is not
@@ -102,9 +108,9 @@ class TetrapodGait(SimulatedTask):
         progress: Distance gained along the commanded direction over the published speed [s].
         drift: Minus half of what is gained in distance from the line of that direction through the
             start, over the published speed.
-        posture: Minus 0.2 (1 - cosine of the tilt).
+        posture: Minus 0.2 (1 - cosine of the tilt), every 0.1 s.
         energy: Minus 0.002 per joule of electrical energy.
-        heat: Minus 0.002 for every kelvin by which a TCA is above ``hot_temperature``.
+        heat: Minus 0.002 for every kelvin by which a TCA is above ``hot_temperature``, every 0.1 s.
         end: Minus 5 in the step in which the robot falls, or a TCA is too hot or torn.
 
     Reset: the robot is put down at the origin and comes to rest, for 0.5 s that are not counted.
@@ -121,10 +127,11 @@ class TetrapodGait(SimulatedTask):
     max_power: ClassVar[float] = 4.0
     max_temperature: ClassVar[float] = 180.0  # annealing temperature, Sun, Table 2.1 [°C]
     hot_temperature: ClassVar[float] = 172.0  # from here on heat is charged [°C]
-    control_period: ClassVar[float] = 0.1  # [s]
     terms = ("progress", "drift", "posture", "energy", "heat", "end")
     energy_price, heat_price, end_price = 0.002, 0.002, 5.0
+    cameras = CAMERAS  # all follow the robot
     scripted = "tca_mj.agents.tetrapod_gaits:scripted"
+    scripted_arguments = {"action": "power"}
     robot_argument = ("robot", TetrapodSpec)
     finer = {"legs": _fine_legs, "fine": _fine_body}
     legs = len(LEGS)
@@ -135,32 +142,27 @@ class TetrapodGait(SimulatedTask):
         self,
         *,
         gait: str = "walk",
-        render_mode: str | None = None,
         robot: TetrapodSpec | None = None,
         body: str = "rigid",
-        timestep: float = 5e-3,
-        camera: str = "follow",
-        size: tuple[int, int] = (960, 720),
+        timestep: float = 6.25e-3,
+        **common: Unpack[TaskArguments],
     ) -> None:
         """Builds the scene.
 
         Args:
             gait: ``crawl``, ``walk`` or ``shimmy``.
-            render_mode: None or ``"rgb_array"``.
             robot: The robot, by default the published one as far as it is known.
             body: One of ``tca_mj.envs.stance.BODIES``. The body is cold: ``rigid`` is all that its
                 gaits need. ``elastic`` and ``fine`` have the spines' springs, heaters and TCAs and
                 say what rigidity leaves out; with ``fine`` the legs are as the robot's, too.
             timestep: Physics time step, of which ``control_period`` is a multiple [s].
-            camera: Camera of the pictures, one of ``CAMERAS``; all follow the robot.
-            size: Width and height of the pictures [pixels].
+            **common: See ``TaskArguments``.
 
         Raises:
             ValueError: If an argument is unknown or out of range, or the robot cannot be built.
         """
         if gait not in TASKS:
             raise ValueError(f"gait must be one of {list(TASKS)}, got {gait!r}")
-        self._look(render_mode, camera, size, cameras=CAMERAS)
         self.gait = gait
         self.task = TASKS[gait]
         self.robot = robot or TetrapodSpec()
@@ -170,12 +172,17 @@ class TetrapodGait(SimulatedTask):
             objects,
             self.robot,
             timestep=timestep,
-            period=_period(self.control_period, timestep),
+            period=_period(type(self).control_period, timestep),
             body=body,
             bend=self.task.bend,
         )
         self.stance = Stance(sim, self.robot)
-        self._open(sim, OBSERVATION, ACTION, self._options())
+        longest, spec = float(sim.bank.longest.max()), self.robot
+        size = spec.spine.length + spec.rail_length + 2.0 * longest
+        seen = OBSERVATION.covering(
+            {"TCA length": (0.0, longest), "foot position": (-size, size), "height": (-size, size)}
+        )
+        self._open(sim, seen, ACTION, self._options(), **common)
         self._forward = np.array([1.0, 0.0])
         self._start = np.zeros(3)
         self._along, self._aside = 0.0, 0.0
@@ -231,17 +238,16 @@ class TetrapodGait(SimulatedTask):
         self.stance.shape(self._bend)
 
     def drive(self, command: NDArray[np.float64]) -> Drive:
-        """Power of the legs' TCAs; see the class."""
-        power = np.zeros(self.sim.n)
-        power[:LEG_TCAS] = self.max_power * (command + 1.0) / 2.0
-        return Drive(power=power)
+        """What the legs' TCAs are told; see the class."""
+        return Drive(command=self.heated(command))
 
     def judge(self, drive: Drive, harmed: bool) -> Verdict:
         """Headway, and whether the robot has fallen."""
         before, self._progress = self._progress, self._measure()
         tilt = 1.0 - float(self.stance.rotation(self.data)[2, 2])
         terms = {name: value - before[name] for name, value in self._progress.items()}
-        return Verdict(terms=terms | {"posture": -0.2 * tilt}, ended=self._fallen(tilt))
+        posture = -0.2 * self.share * tilt
+        return Verdict(terms=terms | {"posture": posture}, ended=self._fallen(tilt))
 
     def _measure(self) -> dict[str, float]:
         """How far the robot has got, by reward term."""

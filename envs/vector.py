@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from tca_mj.batch import SimulationBatch
 from tca_mj.envs.table import numbers
-from tca_mj.envs.task import Observation, Outcome, SimulatedTask
+from tca_mj.envs.task import Observation, Outcome, SimulatedTask, together
 
 Options = Mapping[str, Any] | None
 Flags = NDArray[np.bool_]
@@ -133,23 +133,29 @@ class TaskVector(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[Any
         stepped = np.ones(self.num_envs, dtype=bool) if which is None else which
         if (self._elapsed[stepped] < 0).any():
             raise ResetNeeded("the tasks must be reset before the first step")
-        batch = self.batch
-        drives = [
-            env.begin(command) if go else None
-            for env, command, go in zip(self.envs, commands, stepped, strict=True)
-        ]
-        errors = batch.step(drives, self.envs[0].control_period)
-        outcomes: list[Outcome | None] = []
-        for i, (env, drive, error) in enumerate(zip(self.envs, drives, errors, strict=True)):
-            if drive is None:
-                outcomes.append(None)
+        batch, first, going = self.batch, self.envs[0], stepped.copy()
+        outcomes: list[Outcome | None] = [None] * self.num_envs
+        for _ in range(first.repeats):
+            drives = [
+                env.begin(command) if go else None
+                for env, command, go in zip(self.envs, commands, going, strict=True)
+            ]
+            errors = batch.step(drives, first.interval)
+            for i, (env, drive, error) in enumerate(zip(self.envs, drives, errors, strict=True)):
+                if drive is not None:
+                    outcome = together(outcomes[i], env.finish(drive, error))
+                    outcomes[i], going[i] = outcome, not (outcome[2] or outcome[3])
+            if not going.any():
+                break
+        for i, outcome in enumerate(outcomes):
+            if outcome is None:
                 continue
-            observation, reward, terminated, truncated, info = env.finish(drive, error)
+            observation, reward, terminated, truncated, info = outcome
             self._elapsed[i] += 1
             if self.max_episode_steps is not None:
                 truncated = truncated or bool(self._elapsed[i] >= self.max_episode_steps)
             self._over[i] = terminated or truncated
-            outcomes.append((observation, reward, terminated, truncated, info))
+            outcomes[i] = observation, reward, terminated, truncated, info
         return outcomes
 
     def reset(

@@ -18,7 +18,7 @@ from dm_env import specs
 from numpy.typing import NDArray
 
 from tca_mj.envs.task import how_it_ended
-from tca_mj.render import colour_tendons
+from tca_mj.record.render import colour_tendons
 
 Action = NDArray[np.float32]
 Choice = Callable[[NDArray[np.float32]], Action]

@@ -8,10 +8,74 @@ from typing import Any
 import gymnasium as gym
 from gymnasium.core import ActType, ObsType
 from gymnasium.utils import RecordConstructorArgs
+from gymnasium.vector import VectorWrapper
+from gymnasium.vector.utils import batch_space
 
 from tca_mj.checks import require_count, require_positive
-from tca_mj.envs.task import how_it_ended
+from tca_mj.envs.table import Table
+from tca_mj.envs.task import Observation, how_it_ended
+from tca_mj.envs.vector import TaskVector
 from tca_mj.record import Recorder
+
+
+class ScaledObservation(
+    gym.ObservationWrapper[Observation, Any, Observation], RecordConstructorArgs
+):
+    """Observations by the fixed centres and scales of the task's table, of the order of 1.
+
+    What a learner needs, without statistics that a policy has to carry along; the table's units
+    say what a number means. Left and right have the same scales.
+    """
+
+    def __init__(self, env: gym.Env[Observation, Any]) -> None:
+        """Wraps ``env``.
+
+        Raises:
+            ValueError: If it is no task of this package.
+        """
+        RecordConstructorArgs.__init__(self)
+        gym.ObservationWrapper.__init__(self, env)
+        self._table = _table(env.unwrapped)
+        self.observation_space = self._table.scaled_space
+
+    def observation(self, observation: Observation) -> Observation:
+        """The observation, scaled."""
+        return self._table.scaled(observation)
+
+
+class VectorScaledObservation(VectorWrapper):
+    """``ScaledObservation`` of a vector environment, in every autoreset mode."""
+
+    def __init__(self, env: TaskVector) -> None:
+        """Wraps what ``gymnasium.make_vec`` makes of a task.
+
+        Raises:
+            ValueError: If its tasks are none of this package.
+        """
+        super().__init__(env)
+        self._table = _table(env.envs[0])
+        self.single_observation_space = self._table.scaled_space
+        self.observation_space = batch_space(self.single_observation_space, env.num_envs)
+
+    def reset(self, **kwargs: Any) -> tuple[Any, dict[str, Any]]:
+        """Begins new episodes; arguments as those of what is wrapped."""
+        observations, infos = self.env.reset(**kwargs)
+        return self._table.scaled(observations), infos
+
+    def step(self, actions: Any) -> tuple[Any, Any, Any, Any, dict[str, Any]]:
+        """Steps the tasks; the last observations of episodes that end are scaled, too."""
+        observations, rewards, terminated, truncated, infos = self.env.step(actions)
+        for i, last in enumerate(infos.get("final_obs", ())):
+            if last is not None:
+                infos["final_obs"][i] = self._table.scaled(last)
+        return self._table.scaled(observations), rewards, terminated, truncated, infos
+
+
+def _table(task: Any) -> Table:
+    table = getattr(task, "observation", None)
+    if not isinstance(table, Table):
+        raise ValueError(f"env must have a table of its observation, got {task}")
+    return table
 
 
 class RecordRerun(gym.Wrapper[ObsType, ActType, ObsType, ActType], RecordConstructorArgs):

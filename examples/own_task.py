@@ -11,7 +11,6 @@ import gymnasium as gym
 import numpy as np
 
 from tca_mj.assets import mjcf
-from tca_mj.control import Thermostat
 from tca_mj.envs.options import Option, Options, Uniform, variation_options
 from tca_mj.envs.table import Entry, Table
 from tca_mj.envs.task import SimulatedTask, Verdict
@@ -28,7 +27,14 @@ OBSERVATION = Table(
         Entry("commanded angle", 1, 0.0, 1.0, "rad"),
     ]
 )
-ACTION = Table([Entry("TCA power", 1, -1.0, 1.0, "-", off=-1.0)])
+ACTION = Table([Entry("TCA heating", 1, -1.0, 1.0, "-", off=-1.0)])
+
+
+def hung(stick):
+    robot = Part(new_spec("nod"))
+    robot.spec.worldbody.add_site(name="clamp", pos=[0.0, 0.0, 0.1], quat=[0.0, 1.0, 0.0, 0.0])
+    robot.attach(stick, to="clamp", prefix="stick")
+    return scene(mjcf("arena.xml"), robot, {}, name="robot")
 
 
 class Nod(SimulatedTask):
@@ -39,15 +45,8 @@ class Nod(SimulatedTask):
     energy_price, end_price = 0.01, 1.0
     robot_argument = ("spec", lambda: BendingSpec(count=1))
 
-    def __init__(
-        self, *, spec=None, render_mode=None, timestep=5e-3, camera="front", size=(320, 240)
-    ):
-        self._look(render_mode, camera, size, cameras=("front", "side"))
-        mjspec = new_spec("nod")
-        mjspec.worldbody.add_site(name="clamp", pos=[0.0, 0.0, 0.1], quat=[0.0, 1.0, 0.0, 0.0])
-        robot = Part(mjspec)
-        robot.attach(bending_module(spec or BendingSpec(count=1)), to="clamp", prefix="stick")
-        part = scene(mjcf("arena.xml"), robot, {}, name="robot")
+    def __init__(self, *, spec=None, timestep=5e-3, **common):
+        part = hung(bending_module(spec or BendingSpec(count=1)))
         options = Options(
             [
                 Option(
@@ -57,8 +56,8 @@ class Nod(SimulatedTask):
                 *variation_options(),
             ]
         )  # fmt: skip
-        sim = Simulation(part, timestep=timestep, tca_period=self.control_period)
-        self._open(sim, OBSERVATION, ACTION, options)
+        sim = Simulation(part, timestep=timestep, tca_period=type(self).control_period)
+        self._open(sim, OBSERVATION, ACTION, options, **common)
         self.angle, self.held = 0.0, 0
 
     def prepare(self, setup):
@@ -66,7 +65,7 @@ class Nod(SimulatedTask):
         self.sim.reset()
 
     def drive(self, command):
-        return Drive(power=self.max_power * (command + 1.0) / 2.0)
+        return Drive(command=self.heated(command))
 
     def observe(self):
         return {
@@ -91,8 +90,7 @@ class Nodding:
     phase = "nod"
 
     def __init__(self, task):
-        self.thermostat = Thermostat(heat=task.heat, max_power=task.max_power)
-        self.max_power = task.max_power
+        self.coldest, self.hottest = 25.0, task.safe_temperature
         self.reset()
 
     def reset(self):
@@ -101,9 +99,9 @@ class Nodding:
     def act(self, observation):
         seen = OBSERVATION.read(observation.astype(np.float64))
         error = float((seen["commanded angle"] - seen["angle"])[0])
-        self.target = float(np.clip(self.target + 40.0 * error, 25.0, 150.0))
-        power = self.thermostat.power(seen["TCA temperature"], np.full(1, self.target))
-        return (2.0 * power / self.max_power - 1.0).astype(np.float32)
+        self.target = float(np.clip(self.target + 40.0 * error, self.coldest, 150.0))
+        share = (self.target - self.coldest) / (self.hottest - self.coldest)
+        return np.full(1, 2.0 * share - 1.0, dtype=np.float32)
 
 
 Nod.scripted = Nodding

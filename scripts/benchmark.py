@@ -1,4 +1,4 @@
-"""Measures the speed of the arm and its recordings: ``tca-mj bench`` from a checkout.
+"""Measures the speed of the tasks and their recordings: ``tca-mj bench`` from a checkout.
 
     python scripts/benchmark.py --out runs/bench
 """

@@ -27,7 +27,7 @@ from tca_mj.certify.cable import (
 )
 from tca_mj.machine import machine
 from tca_mj.model import settle
-from tca_mj.model.chain import beam
+from tca_mj.model.chain import add_chain
 from tca_mj.model.part import new_spec
 
 NODES = (4, 8, 16, 32)
@@ -47,7 +47,7 @@ def chain_model(nodes: int, timestep: float, scale: float = 1.0) -> mujoco.MjMod
         stretching=scale * BEAM.stretching,
         damping_time=LIGHT,
     )
-    beam(spec.worldbody, body, nodes=nodes, name="body", collide=False)
+    add_chain(spec.worldbody, body, nodes=nodes, name="body", collide=False)
     return spec.compile()
 
 

@@ -7,9 +7,9 @@ import numpy as np
 from matplotlib.figure import Figure
 from scipy.optimize import brentq
 
-from tca_mj.plots import temperature_colour
-from tca_mj.tca.centreline import CONICAL
-from tca_mj.tca.coilbvp import FibreShape, solve_fibre
+from tca_mj.record.plots import temperature_colour
+from tca_mj.tca.fibre.boundary import FibreShape, solve_fibre
+from tca_mj.tca.fibre.centreline import CONICAL
 
 SHOWN = (25, 55, 70, 85, 100, 115, 130)  # [°C]
 

@@ -16,7 +16,7 @@ from tca_mj.agents.course import CourseWalker
 from tca_mj.agents.tetrapod_gaits import gait_policy
 from tca_mj.envs.course import TetrapodCourse
 from tca_mj.envs.tetrapod import TetrapodGait
-from tca_mj.render import Offscreen, colour_tendons
+from tca_mj.record.render import Offscreen, colour_tendons
 from tca_mj.sim import Simulation
 
 # Time at which a gait is seen [s], distance of the camera, height of what it looks at over the
@@ -49,7 +49,7 @@ def shapes(out: Path) -> None:
     """Crawling, walking and clamping a beam, as in the tasks of single gaits."""
     frames = []
     for gait, (seconds, distance, up) in SHAPES.items():
-        env, policy = TetrapodGait(gait=gait), gait_policy(gait)
+        env, policy = TetrapodGait(gait=gait, action="power"), gait_policy(gait)
         observation, _ = env.reset(seed=0)
         for _ in range(round(seconds / env.control_period)):
             observation, *_ = env.step(policy.act(observation))
@@ -68,7 +68,7 @@ def close(env: TetrapodCourse) -> NDArray[np.uint8]:
 
 def course(out: Path, seed: int) -> None:
     """A picture of each stage."""
-    env = TetrapodCourse()
+    env = TetrapodCourse(action="power")
     observation, _ = env.reset(seed=seed)
     walker, frames, since, stage = CourseWalker(env), {}, 0.0, ""
     ended = False

@@ -22,7 +22,7 @@ from tca_mj.agents.morph import MorphPolicy
 from tca_mj.control.morph import Measurement, Phase
 from tca_mj.envs.morph import MorphModule, hanging_module
 from tca_mj.modules.morphing import MorphingSpec, morphing_module
-from tca_mj.render import Offscreen, colour_tendons
+from tca_mj.record.render import Offscreen, colour_tendons
 from tca_mj.sim import Simulation
 from tca_mj.smp.lumped import LumpedModule
 
@@ -195,7 +195,7 @@ def speed_table() -> str:
 
 def policy_table(seeds: int = 10) -> str:
     """What the scripted policy achieves in the task, in Markdown."""
-    env, policy, rows = MorphModule(), MorphPolicy(), []
+    env, policy, rows = MorphModule(action="power"), MorphPolicy(), []
     lines = ["| seed | start | target | fixed | time | TCA | heater | hottest TCA | reward |",
              "|---" * 9 + "|"]  # fmt: skip
     for seed in range(seeds):
@@ -303,7 +303,7 @@ def draw_shapes(path: Path) -> None:
 
 def overhead() -> str:
     """env.step against the mj_steps in it, in processor time, in Markdown."""
-    env, policy = MorphModule(), MorphPolicy()
+    env, policy = MorphModule(action="power"), MorphPolicy()
     observation, _ = env.reset(seed=0)
     plain, inside, rows = mujoco.mj_step, [0.0], []
 

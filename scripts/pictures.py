@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from tca_mj.agents.scripted import PHASES, PickAndPlace
 from tca_mj.envs.arm import ArmPickPlace
-from tca_mj.render import Offscreen, colour_tendons
+from tca_mj.record.render import Offscreen, colour_tendons
 
 # Time after the start of each phase at which its picture is taken [s].
 MOMENTS = {"align": 1.0, "open": 3.0, "lower": 1.5, "pinch": 3.5, "lift": 1.5, "turn back": 6.0,
@@ -44,7 +44,7 @@ def main(argv: list[str] | None = None) -> None:
     args = parser.parse_args(argv)
     args.out.mkdir(parents=True, exist_ok=True)
 
-    env, policy = ArmPickPlace(), PickAndPlace()
+    env, policy = ArmPickPlace(action="power"), PickAndPlace()
     observation, _ = env.reset(seed=args.seed, options={"object": args.object})
     frames: dict[str, NDArray[np.uint8]] = {}
     ended = False

@@ -37,7 +37,8 @@ def episode(env: BendReach, act: Act, seed: int, **options: float) -> dict[str, 
 
 def baselines() -> str:
     """What does what, as Markdown."""
-    env, policy, blind = BendReach(), ReachPolicy(), ReachPolicy(averaging=math.inf)
+    env, policy = BendReach(action="power"), ReachPolicy()
+    blind = ReachPolicy(averaging=math.inf)
     random = np.random.default_rng(0)
 
     def fresh(script: ReachPolicy) -> Act:
@@ -102,7 +103,8 @@ def history(cases: int = 60) -> str:
 
 def picture(path: Path) -> None:
     """Cold, and at three targets."""
-    env, policy = BendReach(render_mode="rgb_array", size=(400, 440)), ReachPolicy()
+    env = BendReach(action="power", render_mode="rgb_array", size=(400, 440))
+    policy = ReachPolicy()
     panels = []
     for seed, steps in ((4, 0), (4, 200), (8, 200), (10, 200)):
         observation, _ = env.reset(seed=seed)

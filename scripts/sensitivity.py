@@ -19,7 +19,7 @@ import numpy as np
 
 from tca_mj.agents.tetrapod_gaits import gait_policy
 from tca_mj.envs.tetrapod import TetrapodGait
-from tca_mj.modules import leg
+from tca_mj.modules import continuum_leg as leg
 from tca_mj.modules.bending import BendingSpec, bending_module
 from tca_mj.modules.finger import FingerPairSpec, finger_pair
 from tca_mj.modules.twisting import TwistingSpec, twisting_module
@@ -144,7 +144,7 @@ def _lift(data: mujoco.MjData, height: float) -> None:
 
 def walking(world: World, gait: str = "walk") -> float:
     """Speed of the scripted walk over a minute [mm/s]."""
-    env = TetrapodGait(gait=gait, robot=world.robot)
+    env = TetrapodGait(gait=gait, action="power", robot=world.robot)
     policy = gait_policy(gait, world.robot)
     observation, info = env.reset(seed=0)
     for _ in range(round(GAIT_TIME / env.control_period)):

@@ -15,7 +15,7 @@ from tca_mj.smp import HeaterSpec, SmpSpec, SpineSpec, SpineState, advance, reco
 from tca_mj.smp.heater import COOL_TIME, FAN_COOL_TIME, HOLD_TEMPERATURE
 from tca_mj.smp.lumped import LumpedModule, ModuleState, in_tube
 from tca_mj.tca import CATALOGUE, TcaSpec
-from tca_mj.tca.sensing import fit_displacement
+from tca_mj.tca.sensing.wire import fit_displacement
 
 SMP, SPINE, TCA = SmpSpec(), SpineSpec(), CATALOGUE["free-stroke"]
 HEATER = HeaterSpec.fitted(SPINE)

@@ -17,7 +17,7 @@ from studies import BLUE, GREEN, MUJOCO, ORANGE
 from tca_mj.model.part import Part, new_spec
 from tca_mj.modules.bending import bending_module
 from tca_mj.modules.twisting import twisting_module
-from tca_mj.plots import temperature_colour
+from tca_mj.record.plots import temperature_colour
 from tca_mj.robots.arm import ArmSpec
 from tca_mj.rod import RodShape, Segment, solve_series
 from tca_mj.routes import parallel

@@ -14,7 +14,7 @@ from studies import BLUE, GREEN, MUJOCO, ORANGE, PURPLE
 
 from tca_mj.model import settle
 from tca_mj.modules.bending import BendingSpec
-from tca_mj.plots import temperature_colour
+from tca_mj.record.plots import temperature_colour
 from tca_mj.rod import StrandLaw, solve_static
 from tca_mj.routes import parallel
 from tca_mj.tca import CATALOGUE, law_at

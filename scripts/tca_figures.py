@@ -10,7 +10,7 @@ from scipy.optimize import brentq
 
 from tca_mj.modules.bending import BendingSpec
 from tca_mj.modules.twisting import TwistingSpec
-from tca_mj.plots import temperature_colour
+from tca_mj.record.plots import temperature_colour
 from tca_mj.tca import CATALOGUE, CoilRods, HeatStep, TcaBank, TcaSpec, coil_tension
 
 COLOURS = {"type-0-180": "#56b4e9", "type-1-180": "#0072b2", "type-2-200": "#009e73",

@@ -24,7 +24,7 @@ from tca_mj.certify.rest import Load, rest
 from tca_mj.envs.tetrapod import TetrapodGait
 from tca_mj.model.part import Part
 from tca_mj.model.spine import SHEAR_RATIO
-from tca_mj.modules.leg import LegSpec, continuum_leg
+from tca_mj.modules.continuum_leg import LegSpec, continuum_leg
 from tca_mj.robots.tetrapod import TetrapodSpec, tetrapod
 from tca_mj.robots.tetrapod_fine import fine_tetrapod
 from tca_mj.rod import solve_static
@@ -343,7 +343,7 @@ def headway(gait: str, seconds: float, **options: Any) -> Array:
         seconds: Time that counts, rounded to whole cycles.
         **options: Of ``TetrapodGait``.
     """
-    env, policy = TetrapodGait(gait=gait, **options), gait_policy(gait)
+    env, policy = TetrapodGait(gait=gait, action="power", **options), gait_policy(gait)
     period = policy.gait.period / env.control_period
     first, last = (round(math.ceil(n) * period) for n in (100.0 / period, 10.0 * seconds / period))
     observation, begin = env.reset(seed=0)
@@ -392,7 +392,7 @@ def rods(seconds: float = 60.0) -> list[str]:
         cells = []
         for name in GAITS:
             for who in WHO:
-                env = TetrapodGait(gait=name, robot=robot)
+                env = TetrapodGait(gait=name, action="power", robot=robot)
                 learned = who == "searched"
                 policy = load_policy(f"tetrapod-{name}", env) if learned else gait_policy(name)
                 observation, info = env.reset(seed=0)

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import RectBivariateSpline
 
 from tca_mj.envs.tetrapod import TetrapodGait
-from tca_mj.modules.leg import LegSpec
+from tca_mj.modules.continuum_leg import LegSpec
 from tca_mj.rod import solve_static
 from tca_mj.routes import parallel
 from tca_mj.tca import HeatSpec, law_at, step_temperature

@@ -2,6 +2,7 @@
 
 import hashlib
 import math
+from functools import partial
 
 import gymnasium as gym
 import mujoco
@@ -11,7 +12,7 @@ from gymnasium.vector import AsyncVectorEnv
 
 from tca_mj.envs.arm import ACTION, OBJECTS, OBSERVATION, ArmPickPlace
 from tca_mj.envs.table import Entry, Table
-from tca_mj.render import RenderingUnavailable
+from tca_mj.record.render import RenderingUnavailable
 
 ID = "TCA/ArmPickPlace-v0"
 OFF = np.array([-1.0] * 5 + [0.0], dtype=np.float32)
@@ -20,7 +21,7 @@ OFF = np.array([-1.0] * 5 + [0.0], dtype=np.float32)
 @pytest.fixture(scope="module")
 def shared():
     """One environment for the tests that reset it; that resets forget everything is a test too."""
-    return ArmPickPlace()
+    return ArmPickPlace(action="power")
 
 
 def rollout(env, seed=7, steps=4):
@@ -107,7 +108,7 @@ def test_the_action_heats_and_moves(shared):
 
 
 def test_it_runs_in_parallel_processes(shared):
-    envs = AsyncVectorEnv([ArmPickPlace, ArmPickPlace])
+    envs = AsyncVectorEnv([partial(ArmPickPlace, action="power")] * 2)
     try:
         observation, info = envs.reset(seed=[7, 8])
         assert observation.shape == (2, OBSERVATION.size)
@@ -285,7 +286,12 @@ def test_it_draws_itself():
     assert picture.std() > 5.0
 
 
-TABLE = Table([Entry("angle", 1, -3.0, 3.0, "rad"), Entry("force", 2, 0.0, 5.0, "N")])
+TABLE = Table(
+    [
+        Entry("angle", 1, -3.0, 3.0, "rad"),
+        Entry("force", 2, 0.0, 5.0, "N", centre=2.0, scale=0.5),
+    ]
+)
 
 
 def test_a_table_packs_and_reads_its_rows():
@@ -306,8 +312,10 @@ def test_a_table_names_what_is_outside():
 
 def test_a_table_is_also_markdown():
     lines = TABLE.markdown().splitlines()
-    assert lines[0] == "| index | entry | low | high | unit |"
-    assert lines[2:] == ["| 0 | angle | -3 | 3 | rad |", "| 1-2 | force | 0 | 5 | N |"]
+    assert lines[0] == "| index | entry | low | high | unit | scale |"
+    assert lines[2:] == [
+        "| 0 | angle | -3 | 3 | rad | ± 3 |", "| 1-2 | force | 0 | 5 | N | 2 ± 0.5 |"
+    ]
 
 
 @pytest.mark.parametrize(

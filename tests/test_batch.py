@@ -66,7 +66,7 @@ def differing(one: Simulation, other: Simulation) -> list[str]:
 
 def drives(sim: Simulation, random: np.random.Generator) -> Drive:
     return Drive(
-        power=random.uniform(0.0, 1.0, sim.n),
+        command=random.uniform(0.0, 1.0, sim.n),
         voltage=random.uniform(0.0, 25.0, sim.spines.n),
         fan=random.random(sim.spines.n) < 0.3,
     )
@@ -74,7 +74,7 @@ def drives(sim: Simulation, random: np.random.Generator) -> Drive:
 
 def alone(sim: Simulation, drive: Drive, duration: float) -> str | None:
     try:
-        sim.step(drive.power, duration, voltage=drive.voltage, fan=drive.fan)
+        sim.step(drive.command, duration, voltage=drive.voltage, fan=drive.fan)
     except SimulationDiverged as error:
         return str(error)
     return None
@@ -161,28 +161,28 @@ def test_one_that_diverges_breaks_off_as_alone_and_touches_no_other(build, harm)
 def test_who_is_not_driven_stands_still_and_can_be_stepped_alone():
     sims, single = [bending() for _ in range(3)], bending()
     batch = SimulationBatch(sims)
-    drive = Drive(power=np.full(sims[0].n, 0.5))
+    drive = Drive(command=np.full(sims[0].n, 0.5))
     before = everything(sims[1])
     assert batch.step([drive, None, drive], 0.1) == [None] * 3
     assert everything(sims[1]) == before
     assert batch.step([None] * 3, 0.1) == [None] * 3
-    sims[1].step(drive.power, 0.1)
+    sims[1].step(drive.command, 0.1)
     batch.step([None, drive, None], 0.1)
     for _ in range(2):
-        single.step(drive.power, 0.1)
+        single.step(drive.command, 0.1)
     assert differing(single, sims[1]) == []
 
 
 def test_what_is_refused_moves_nobody():
     sims = [bending(), bending()]
     batch = SimulationBatch(sims)
-    good = Drive(power=np.zeros(sims[0].n))
+    good = Drive(command=np.zeros(sims[0].n))
     before = [everything(sim) for sim in sims]
     for given, duration, complaint in (
         ([good], 0.1, "drives must be 2"),
         ([good, good], 0.03, "multiple of tca_period"),
-        ([good, Drive(power=np.full(sims[0].n, -1.0))], 0.1, "at least 0 W"),
-        ([good, Drive(power=np.zeros(1))], 0.1, "shape"),
+        ([good, Drive(command=np.full(sims[0].n, -1.0))], 0.1, "at least 0 W"),
+        ([good, Drive(command=np.zeros(1))], 0.1, "shape"),
         ([good, replace(good, voltage=np.nan)], 0.1, "voltage"),
     ):
         with pytest.raises(ValueError, match=complaint):

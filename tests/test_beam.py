@@ -89,14 +89,14 @@ def test_a_bad_box_is_refused(field, value):
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"bending": (1.0, -1.0)}, r"bending\[1\] must be finite and above 0, got -1"),
+        ({"bending": (1.0, -1.0)}, r"bending must be finite and above 0, got \(1\.0, -1\.0\)"),
         ({"torsion": 0.0}, "torsion must be finite and above 0, got 0"),
         ({"stretching": math.nan}, "stretching must be finite and above 0, got nan"),
         ({"shearing": 0.0}, "shearing must be finite and above 0, got 0"),
         ({"line_density": 0.0}, "line_density must be finite and above 0, got 0"),
-        ({"curvature": (0.0, 1.0)}, r"curvature must be three finite numbers, got \(0\.0, 1\.0\)"),
-        ({"curvature": (0.0, math.nan, 0.0)}, "curvature must be three finite numbers"),
-        ({"damping_time": -1.0}, "damping_time must be at least 0 s, got -1"),
+        ({"curvature": (0.0, 1.0)}, r"curvature must be finite numbers of shape \(3,\), got"),
+        ({"curvature": (0.0, math.nan, 0.0)}, "curvature must be finite, got"),
+        ({"damping_time": -1.0}, "damping_time must be finite and at least 0 s, got -1"),
     ],
 )
 def test_a_bad_beam_is_refused(change, message):
@@ -114,7 +114,7 @@ def test_a_bad_outer_diameter_is_refused():
     [
         (0.0, 1e-3, r"half_width must be finite and above 0, got 0\.0"),
         (1e-3, math.nan, "half_height must be finite and above 0, got nan"),
-        (1e-3, 2e-3, "a round outline has half_width equal to half_height"),
+        (1e-3, 2e-3, "half_height must be half_width 0.001 m in a round outline, got 0.002"),
     ],
 )
 def test_a_bad_outline_is_refused(half_width, half_height, message):

@@ -10,7 +10,8 @@ from tca_mj import cli
 from tca_mj.certify import claims, outcomes, report
 from tca_mj.certify.cable import cable
 from tca_mj.certify.cases import Case, at_rest, draw, gap, theory
-from tca_mj.certify.outcomes import Effort, Outcome, judge, within
+from tca_mj.certify.outcomes import Effort, Outcome, judge
+from tca_mj.certify.report import within
 from tca_mj.certify.rest import Load
 from tca_mj.certify.subjects import SUBJECTS
 from tca_mj.model import chain
@@ -87,8 +88,8 @@ def test_a_body_too_stiff_by_a_twentieth_is_seen(monkeypatch):
     """Not by its size, but more nodes do not help."""
     right = chain._add_joint
 
-    def stiff(body, spec, *rest):
-        right(body, replace(spec, bending=(1.05 * spec.bending[0], 1.05 * spec.bending[1])), *rest)
+    def stiff(body, name, motion, stiffness, *rest):
+        right(body, name, motion, stiffness * (1.05 if "bend" in motion else 1.0), *rest)
 
     monkeypatch.setattr(chain, "_add_joint", stiff)
     subject, case = hot("bending")

@@ -11,8 +11,10 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
-from tca_mj import bench, bench_vector, cli, registry
+from tca_mj import cli, registry
 from tca_mj.agents import demo
+from tca_mj.agents.actors import arguments_of
+from tca_mj.bench import single, vector
 from tca_mj.cli.play import _policy
 from tca_mj.envs.arm import ArmPickPlace
 from tca_mj.envs.viewer import NoDisplay, ViewerEnvironment, need_display
@@ -151,7 +153,7 @@ def test_the_viewer_steps_the_task_itself(
 ) -> None:
     """The adapter without a window: one state, seen by MuJoCo and through dm_control."""
     monkeypatch.setenv("MUJOCO_GL", "disable")
-    env = gym.make(TASK)
+    env = gym.make(TASK, **arguments_of(policy, TASK))
     shown = ViewerEnvironment(env, seed=2, options={"object": "pcb"})
     act = _policy(policy, env, 2)
     step = shown.reset()
@@ -185,13 +187,13 @@ def test_the_benchmark_writes_what_it_prints(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Of its figures, only that they exist: how fast a machine is is no test."""
-    plain = bench.benchmark
-    monkeypatch.setattr(bench, "benchmark", lambda **kw: plain(**(kw | {"scale": 0.01})))
+    plain = single.benchmark
+    monkeypatch.setattr(single, "benchmark", lambda **kw: plain(**(kw | {"scale": 0.01})))
     assert cli.main(["bench", "single", "--quick", "--out", str(tmp_path)]) == 0
     said = capsys.readouterr().out
     assert said.startswith((tmp_path / "benchmark.md").read_text(encoding="utf-8"))
     result = json.loads((tmp_path / "benchmark.json").read_text(encoding="utf-8"))
-    assert result["arm"]["idle"] > 0.0
+    assert result["physics"]["no power"] > 0.0
     assert result["episode"]["all"]["ratio"] > 0.5
     assert result["episode"]["phases"]["align"]["outside"] > 0.0
     assert result["recording"]["share"] > 0.0
@@ -204,9 +206,9 @@ def test_the_benchmark_writes_what_it_prints(
 def test_the_benchmark_of_many_tasks_writes_what_it_prints(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    plain, id = bench_vector.benchmark, "TCA/MorphModule-v0"
+    plain, id = vector.benchmark, "TCA/MorphModule-v0"
     few = {"scale": 0.01, "ids": [id], "num_envs": 2}
-    monkeypatch.setattr(bench_vector, "benchmark", lambda **kw: plain(**(kw | few)))
+    monkeypatch.setattr(vector, "benchmark", lambda **kw: plain(**(kw | few)))
     assert cli.main(["bench", "vector", "--out", str(tmp_path)]) == 0
     said = capsys.readouterr().out
     assert said.startswith((tmp_path / "vector.md").read_text(encoding="utf-8"))

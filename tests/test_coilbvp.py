@@ -11,10 +11,10 @@ from scipy.integrate import solve_bvp, solve_ivp
 from scipy.optimize import fsolve
 from scipy.special import ellipe, ellipk
 
-import tca_mj.rod.deadload as deadload
-import tca_mj.rod.equilibrium as equilibrium
-import tca_mj.tca.coilbvp as coilbvp
-from tca_mj.rod.deadload import RodSolveError
+import tca_mj.rod.deadload.descent as equilibrium
+import tca_mj.rod.deadload.wrench as deadload
+import tca_mj.tca.fibre.boundary as coilbvp
+from tca_mj.rod.errors import RodSolveError
 from tca_mj.rod.lie import (
     hat,
     integrate_strain,
@@ -27,8 +27,8 @@ from tca_mj.rod.lie import (
     screw_translation,
 )
 from tca_mj.tca import CATALOGUE, CoilRods, untwist
-from tca_mj.tca.centreline import CONICAL, Centreline, ConicalTca
-from tca_mj.tca.coilbvp import fibre_stiffness, solve_fibre
+from tca_mj.tca.fibre.boundary import fibre_stiffness, solve_fibre
+from tca_mj.tca.fibre.centreline import CONICAL, Centreline, ConicalTca
 
 MADE = CATALOGUE["free-stroke-made"]
 FIBRE = MADE.fibre
@@ -189,7 +189,7 @@ class LockedHelix:
     """A loaded TCA with locked ends as ``CoilRods.helix`` has it, hanging along -z."""
 
     def __init__(self, tca, length, temperature):
-        helix = CoilRods([tca]).helix(np.array([length]), np.array([temperature]))
+        helix = CoilRods([tca]).shape(np.array([length]), np.array([temperature]))
         self.pitch, self.radius = helix.pitch[0], helix.radius[0]
         self.tension, self.winding = helix.tension[0], tca.winding
         self.fall = length / tca.fibre_length

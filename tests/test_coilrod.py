@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq, root
 
-import tca_mj.tca.coilrod as coilrod
+import tca_mj.tca.laws.rod as coilrod
 from tca_mj.tca import CATALOGUE, CoilRods, CoilSolveError, coil_tension
 
 FREE_STROKE = CATALOGUE["free-stroke"]
@@ -104,7 +104,7 @@ def test_small_heating_pulls_by_stiffness_times_kinematic_coefficient(spec):
 @pytest.mark.parametrize("temperature", [20.0, 25.0, 100.0, 160.0])
 def test_the_four_equations_of_the_helix_hold(spec, temperature):
     length = lengths(spec, 15, 0.97)[:, None]
-    helix = CoilRods([spec]).helix(length, np.full_like(length, temperature))
+    helix = CoilRods([spec]).shape(length, np.full_like(length, temperature))
     theory = Theory(spec, temperature)
     for i in range(len(length)):
         left = theory.left(helix.tension[i, 0]) if temperature > 25.0 else 1.0 - theory.fall
@@ -141,7 +141,7 @@ def test_stiffness_against_a_complex_step(spec, temperature):
     theory = Theory(spec, temperature)
     length = np.linspace(1.001 * spec.minimum_length, 0.6 * spec.fibre_length, 9)[:, None]
     rods = CoilRods([spec])
-    pitch = rods.helix(length, np.full_like(length, temperature)).pitch[:, 0]
+    pitch = rods.shape(length, np.full_like(length, temperature)).pitch[:, 0]
     _, stiffness = rods.tension(length, np.full_like(length, temperature))
     for i, b in enumerate(pitch):
         b = complex(b, 1e-30)
@@ -198,7 +198,7 @@ def test_steep_coils_that_are_stiff_in_bending_buckle(stiff, pitch):
     length = np.linspace(spec.minimum_length, rods.longest, 500)
     cold = np.full_like(length, 25.0)
     border = (math.cos(pitch) / (1.0 - 2.0 / stiff)) ** (1.0 / 3.0)
-    excess = np.cos(rods.helix(length, cold).pitch) - border
+    excess = np.cos(rods.shape(length, cold).pitch) - border
     clear = np.abs(excess) > 0.01
     _, slope = rods.tension(length, cold)
     assert np.array_equal((slope < 0.0)[clear], (excess > 0.0)[clear])
@@ -222,7 +222,7 @@ def test_touching_coils_take_the_pull_away(spec):
     for temperature in (100.0, 150.0):
         for length in (low, 1.01 * low, spec.rest_length):
             at = np.array([length]), np.array([temperature])
-            assert rods.tension(*at)[0] == rods.helix(*at).tension
+            assert rods.tension(*at)[0] == rods.shape(*at).tension
     # Type 2-200 and the made shape are too long to close at 150 °C; the others press.
     blocked, _ = coil_tension(spec, low, 150.0)
     if blocked > 0.0:

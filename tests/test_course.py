@@ -34,7 +34,7 @@ OFF = -np.ones(ACTION.size, dtype=np.float32)
 @pytest.fixture(scope="module")
 def shared():
     """One environment for the tests that reset it; that resets forget everything is a test too."""
-    return TetrapodCourse()
+    return TetrapodCourse(action="power")
 
 
 def bent(env, angle, x, z):
@@ -73,7 +73,7 @@ def test_gymnasium_and_stable_baselines3_are_content():
 
 
 def test_the_same_seed_gives_the_same_bits_after_any_history(shared):
-    first = rollout(TetrapodCourse())
+    first = rollout(TetrapodCourse(action="power"))
     rollout(shared, seed=99)
     assert rollout(shared) == first
     assert rollout(shared, seed=8) != first
@@ -249,7 +249,7 @@ def test_the_course_file_and_the_plan_agree(shared):
 @pytest.mark.parametrize("friction", [0.8, 1.2])
 def test_curled_legs_open_the_body(friction):
     """Without them friction would keep it bent, or it would fall to one side."""
-    env = TetrapodCourse()
+    env = TetrapodCourse(action="power")
     env.reset(seed=0, options={"friction": friction})
     bent(env, np.radians(206.0), env.places.beam_end + 0.047, 0.057)
     walker = CourseWalker(env)
@@ -264,7 +264,7 @@ def test_curled_legs_open_the_body(friction):
 
 @pytest.mark.parametrize(("degrees", "stage"), [(110.0, "walk on"), (120.0, "open")])
 def test_a_body_that_is_open_is_not_opened_again(degrees, stage):
-    env = TetrapodCourse()
+    env = TetrapodCourse(action="power")
     env.reset(seed=0)
     bent(env, np.radians(degrees), env.places.beam_end + 0.047, 0.04)
     walker = CourseWalker(env)
@@ -277,7 +277,7 @@ def test_the_crawl_goes_forward_and_the_walk_is_faster():
     """A few cycles of each; over the whole course the demo prints the speeds."""
     speeds = {}
     for gait, angle, z in (("crawl", 20.0, 0.013), ("walk", 95.0, 0.075)):
-        env = TetrapodCourse()
+        env = TetrapodCourse(action="power")
         env.reset(seed=0)
         bent(env, np.radians(angle), 0.0 if gait == "crawl" else 0.3, z)
         walker = CourseWalker(env)

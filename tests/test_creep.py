@@ -6,8 +6,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tca_mj.tca import CATALOGUE, CoilRods, coil_tension, untwist
-from tca_mj.tca.creep import (
+from tca_mj.tca import (
+    CATALOGUE,
+    CoilRods,
+    Heating,
+    Load,
+    LoadedTcas,
+    LoadState,
+    coil_tension,
+    untwist,
+)
+from tca_mj.tca.catalogue import FREE_STROKE_CREPT
+from tca_mj.tca.laws.creep import (
     CreepBank,
     CreepSpec,
     CreepState,
@@ -15,8 +25,6 @@ from tca_mj.tca.creep import (
     hysteresis_damping,
     relaxation_time,
 )
-from tca_mj.tca.dynamics import Heating, Load, LoadedTcas, LoadState
-from tca_mj.tca.spec import FREE_STROKE_CREPT
 
 TCA = CATALOGUE["free-stroke"]
 TYPE_1 = CATALOGUE["type-1-180"]

@@ -15,7 +15,7 @@ from rerun.chunk import RrdReader
 from tca_mj.agents import episode
 from tca_mj.agents.demo import play
 from tca_mj.envs.arm import ArmPickPlace
-from tca_mj.render import RenderingUnavailable, gl_backend
+from tca_mj.record.render import RenderingUnavailable, gl_backend
 
 OFF = np.array([-1.0, -1.0, -1.0, -1.0, -1.0, 0.0], dtype=np.float32)
 TCAS = ["arm.bending.tca0", "arm.bending.tca1", "arm.bending.tca2", "arm.wrist.tca",
@@ -23,7 +23,10 @@ TCAS = ["arm.bending.tca0", "arm.bending.tca1", "arm.bending.tca2", "arm.wrist.t
 
 
 def pick_and_place(object: str = "screwdriver", policy: Any = "scripted", **more: Any) -> Any:
-    return play("TCA/ArmPickPlace-v0", policy, options={"object": object}, **more)
+    arguments = None if policy == "scripted" else {"action": "power"}
+    return play(
+        "TCA/ArmPickPlace-v0", policy, options={"object": object}, arguments=arguments, **more
+    )
 
 
 class Stub:
@@ -96,7 +99,7 @@ def test_the_scripted_agent_for_a_moment(tmp_path: Path) -> None:
     assert recorded(out) == (["episode 1, seed 3", "align"], 5)
     assert verified(out)
     # The printed object is where a fresh environment puts it.
-    task = ArmPickPlace()
+    task = ArmPickPlace(action="power")
     _, _ = task.reset(seed=3, options={"object": "pcb"})
     start = task.data.body("pcb.pcb").xpos
     np.testing.assert_allclose(result["object_position"], start, atol=1e-3)

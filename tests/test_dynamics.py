@@ -7,16 +7,19 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
-from tca_mj.tca import CATALOGUE, CoilRods, CoilSolveError, coil_tension
-from tca_mj.tca.course import _chained, solve_course
-from tca_mj.tca.dynamics import (
-    Course,
+from tca_mj.tca import (
+    CATALOGUE,
+    CoilRods,
+    CoilSolveError,
     Heating,
     Load,
     LoadedTcas,
     LoadState,
     MotionSolveError,
+    coil_tension,
 )
+from tca_mj.tca.dynamics.banded import _chained, solve_course
+from tca_mj.tca.dynamics.loads import Course
 
 TCA = CATALOGUE["free-stroke"]
 MASS = 0.03  # [kg]

@@ -11,13 +11,13 @@ import pytest
 import tca_mj  # noqa: F401  (registers the ids)
 from tca_mj import cli
 from tca_mj.agents import evaluate as module
-from tca_mj.agents.actors import actor
+from tca_mj.agents.actors import actor, arguments_of
 from tca_mj.agents.demo import play
 from tca_mj.agents.evaluate import EPISODES, Evaluation, cell, evaluate, figures, report
 from tca_mj.agents.policy import Origin, SavedPolicy
 from tca_mj.agents.tetrapod_gaits import WALK
 from tca_mj.envs.tetrapod import TetrapodGait
-from tca_mj.registry import TASKS
+from tca_mj.registry import TASKS, make
 
 REACH, WALKING = "TCA/BendReach-v0", "TCA/TetrapodWalk-v0"
 SHORT = Evaluation(task=REACH, policy="random", episodes=3, steps=4, randomise=0.2)
@@ -136,9 +136,9 @@ def test_a_saved_policy_is_known_by_its_contents(tmp_path):
 def test_a_gaits_figures_are_those_of_the_episode():
     evaluation = Evaluation(task=WALKING, episodes=1, seed=4, steps=6, randomise=0.2)
     found = evaluate(evaluation, progress=False)["episodes"][0]
-    env = TetrapodGait()
+    env = TetrapodGait(action="power")
     observation, info = env.reset(seed=4, options={"randomise": 0.2})
-    policy, total, hottest = actor("scripted", gym.make(WALKING)), 0.0, 0.0
+    policy, total, hottest = actor("scripted", env), 0.0, 0.0
     for _ in range(6):
         observation, reward, *_, info = env.step(policy.act(observation))
         total, hottest = total + reward, max(hottest, info["temperature"].max())
@@ -220,7 +220,7 @@ def test_an_unknown_policy_is_said_before_anything_runs(tmp_path):
 @pytest.mark.parametrize("task", [task.id for task in TASKS])
 @pytest.mark.parametrize("name", ["scripted", "off", "random"])
 def test_everyone_can_act_in_every_task(task, name):
-    env = gym.make(task)
+    env = make(task, **arguments_of(name, task))
     policy = actor(name, env, seed=1)
     observation, _ = env.reset(seed=0)
     policy.reset()

@@ -65,20 +65,20 @@ def test_pressed_together_it_is_slack_down_to_no_length():
     "length", [-1e-9, 0.981 * TCA.fibre_length, math.nan, math.inf, 0.05j, "long", None, [[1], 2]]
 )
 def test_bad_lengths_are_refused(length):
-    with pytest.raises(ValueError, match="length = "):
+    with pytest.raises(ValueError, match="length must be"):
         law_at(TCA, 25.0)(length)
 
 
 @pytest.mark.parametrize(
     ("temperature", "kind", "match"),
     [
-        (math.nan, {}, "temperature = nan"),
-        (-300.0, {}, "temperature = -300.0 °C must lie strictly between -273.15 and 260.0"),
-        (260.0, {}, "temperature = 260.0 °C must lie strictly between"),
-        ([25.0, 30.0], {}, r"temperature has shape \(2,\); it must be one number"),
-        ("hot", {}, "temperature = 'hot' must be a real number"),
-        (25.0, {"model": "beam"}, "model = 'beam'"),
-        (25.0, {"spin": "both"}, "spin = 'both'"),
+        (math.nan, {}, "temperature must be finite .* got nan"),
+        (-300.0, {}, "temperature must be .* above -273.15 and below 260 °C, got -300.0"),
+        (260.0, {}, "temperature must be .* below 260 °C, got 260.0"),
+        ([25.0, 30.0], {}, "temperature must be one finite number"),
+        ("hot", {}, "temperature must be a real number .* got 'hot'"),
+        (25.0, {"model": "beam"}, "model must be .* got 'beam'"),
+        (25.0, {"spin": "both"}, "spin must be .* got 'both'"),
     ],
 )
 def test_bad_questions_are_refused(temperature, kind, match):
@@ -90,5 +90,5 @@ def test_a_contact_too_soft_to_stop_the_pull_is_refused():
     fibre = replace(TCA.fibre, untwist_scale=3.0)
     soft = replace(TCA, fibre=fibre, contact_ratio=0.01)
     assert law_at(soft, 25.0)(0.0) == (0.0, 0.0)
-    with pytest.raises(ValueError, match="contact_ratio = 0.01 must be larger"):
+    with pytest.raises(ValueError, match="contact_ratio must be larger .* got 0.01"):
         law_at(soft, 150.0)

@@ -22,7 +22,7 @@ from tca_mj.control.pi import PiSpec
 from tca_mj.smp import HeaterSpec, SpineSpec
 from tca_mj.smp.lumped import LumpedModule, sheathed
 from tca_mj.tca import CATALOGUE
-from tca_mj.tca.sensing import fit_displacement
+from tca_mj.tca.sensing.wire import fit_displacement
 
 SPINE = SpineSpec()
 TCA = sheathed(CATALOGUE["free-stroke"], SPINE)
@@ -324,9 +324,9 @@ def test_a_sequence_checks_itself(field, value):
 def test_drives_targets_and_steps_check_themselves():
     with pytest.raises(ValueError, match="voltage"):
         OpenLoop(voltage=0.0)
-    with pytest.raises(ValueError, match="pi must limit"):
+    with pytest.raises(ValueError, match="highest power"):
         ClosedLoop(pi=replace(PI, highest=math.inf), angle_of=float)
-    with pytest.raises(ValueError, match="pi must limit"):
+    with pytest.raises(ValueError, match="lowest power"):
         ClosedLoop(pi=replace(PI, lowest=-1.0), angle_of=float)
     with pytest.raises(ValueError, match="target"):
         closed().start(math.nan)

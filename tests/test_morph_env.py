@@ -14,7 +14,7 @@ import pytest
 from tca_mj.agents.morph import MorphPolicy
 from tca_mj.control.morph import Phase
 from tca_mj.envs.morph import ACTION, OBSERVATION, MorphModule
-from tca_mj.render import RenderingUnavailable
+from tca_mj.record.render import RenderingUnavailable
 from tca_mj.smp import lumped
 
 ID = "TCA/MorphModule-v0"
@@ -26,7 +26,7 @@ KEEP = np.array([2.0 * 9.5 / 25.0 - 1.0, -1.0, -1.0], dtype=np.float32)
 @pytest.fixture(scope="module")
 def shared():
     """One environment for the tests that reset it; that resets forget everything is a test too."""
-    return MorphModule()
+    return MorphModule(action="power")
 
 
 def wild(env, steps, seed):
@@ -245,7 +245,7 @@ def test_a_tube_that_is_known_to_20_percent_damages_nothing(monkeypatch, name, f
         return replace(tca, body=replace(tca.body, **{name: factor * getattr(tca.body, name)}))
 
     monkeypatch.setattr(lumped, "in_tube", other)
-    env = MorphModule()
+    env = MorphModule(action="power")
     monkeypatch.setattr(lumped, "in_tube", nominal)
     believed = MorphPolicy().module_spec.sheathed.body
     real = env.sim.bank.specs[0].body

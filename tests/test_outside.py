@@ -8,10 +8,11 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
-from tca_mj import bench_vector, cli
+from tca_mj import cli
 from tca_mj.agents.config import OffPolicy, TrainConfig
 from tca_mj.agents.evaluate import Evaluation, evaluate
 from tca_mj.agents.sweep import Sweep
+from tca_mj.bench import vector
 from tca_mj.envs.wrappers import RecordRerun
 
 ROOT = Path(__file__).parent.parent
@@ -70,7 +71,7 @@ def test_it_is_swept_and_timed():
     sweep = Sweep(evaluation=Evaluation(task=NOD), axes={"design.length": (0.05, 0.06)})
     lengths = [trial.evaluation(Path()).make().unwrapped.sim.model for trial in sweep.trials()]
     assert lengths[0].body_mass.sum() < lengths[1].body_mass.sum()
-    assert NOD in bench_vector.benchmark(ids=[NOD], num_envs=2, scale=0.1)["tasks"]
+    assert NOD in vector.benchmark(ids=[NOD], num_envs=2, scale=0.1)["tasks"]
 
 
 def test_the_machinery_names_no_task_and_no_robot():

@@ -13,7 +13,7 @@ def test_the_object_is_held_to_the_cup_and_let_go_there(kind):
 
     A screwdriver has two seats in the fingers, 2.3 mm apart; with this seed it stays in one.
     """
-    env, policy = ArmPickPlace(), PickAndPlace()
+    env, policy = ArmPickPlace(action="power"), PickAndPlace()
     observation, _ = env.reset(seed=1, options={"object": kind})
     phases, held, hottest, total, info = [], {}, 0.0, 0.0, {}
     for _ in range(900):

@@ -10,12 +10,14 @@ import numpy as np
 import pytest
 
 from tca_mj.agents import policy as files
+from tca_mj.agents.actors import arguments_of
 from tca_mj.agents.network import Network
 from tca_mj.agents.policy import Origin, SavedPolicy, load_policy
 from tca_mj.agents.tetrapod_gaits import WALK, gait_policy
 from tca_mj.control import Gait
 from tca_mj.envs.tetrapod import ACTION, OBSERVATION
-from tca_mj.modules.leg import LegSpec
+from tca_mj.modules.continuum_leg import LegSpec
+from tca_mj.registry import make
 
 WALKING = "TCA/TetrapodWalk-v0"
 ORIGIN = Origin(algorithm="by hand", seed=3, steps=7, command="none", versions={"numpy": "2"})
@@ -49,7 +51,7 @@ POLICIES = {
 
 @pytest.fixture(scope="module")
 def env():
-    return gym.make(WALKING)
+    return gym.make(WALKING, action="power")
 
 
 def seen(n: int) -> list[np.ndarray]:
@@ -122,7 +124,7 @@ def test_wrong_files_are_refused_by_name(env, tmp_path):
     with pytest.raises(FileNotFoundError, match="no shipped policy of that name"):
         load_policy("nobody", env)
     path = POLICIES["gait"].save(tmp_path / "walk.json")
-    other = gym.make("TCA/TetrapodCrawl-v0")
+    other = gym.make("TCA/TetrapodCrawl-v0", action="power")
     with pytest.raises(ValueError, match="for TCA/TetrapodWalk-v0, not for TCA/TetrapodCrawl-v0"):
         load_policy(path, other)
     header = json.loads(path.read_text())
@@ -131,7 +133,7 @@ def test_wrong_files_are_refused_by_name(env, tmp_path):
         ({"kind": "fuzzy"}, "kind must be one of"),
         ({"steering": [1.0]}, "steering must have 4 numbers"),
         ({"gait": header["gait"] | {"period": -1.0}}, "period must be finite and above 0"),
-        ({"gait": header["gait"] | {"hot": "hot"}}, "hot must be rows of finite numbers"),
+        ({"gait": header["gait"] | {"hot": "hot"}}, "hot must be a real number"),
         ({"origin": {}}, "is no policy"),
     ):
         path.write_text(json.dumps(header | change))
@@ -191,7 +193,8 @@ def test_a_policy_loads_without_what_trained_it(tmp_path):
     path = POLICIES["residual"].save(tmp_path / "walk.npz")
     code = (
         "import sys, gymnasium, tca_mj; from tca_mj.agents.policy import load_policy\n"
-        f"env = gymnasium.make('{WALKING}'); p = load_policy({str(path)!r}, env); p.reset()\n"
+        f"env = gymnasium.make('{WALKING}', action='power')\n"
+        f"p = load_policy({str(path)!r}, env); p.reset()\n"
         "p.act(env.reset(seed=0)[0])\n"
         "print([m for m in ('torch', 'stable_baselines3', 'cmaes') if m in sys.modules])"
     )
@@ -199,10 +202,49 @@ def test_a_policy_loads_without_what_trained_it(tmp_path):
     assert done.stdout.strip() == "[]", done.stderr
 
 
+@pytest.mark.parametrize(
+    ("arguments", "made", "message"),
+    [
+        ({"action": "power"}, {}, "action must be 'power' for this policy, got 'temperature'"),
+        ({}, {"action": "power"}, "action must be 'temperature' for this policy, got 'power'"),
+        (
+            {"action": "power", "control_period": 0.2},
+            {"action": "power"},
+            "control_period must be 0.2 for this policy, got 0.1",
+        ),
+        (
+            {"action": "power"},
+            {"action": "power", "control_period": 0.05},
+            "control_period must be 0.1 for this policy, got 0.05",
+        ),
+    ],
+)
+def test_a_policy_for_another_action_is_refused(arguments, made, message, tmp_path):
+    """The file says what the task was made with, and with that it acts."""
+    saved = SavedPolicy(
+        task=WALKING, origin=ORIGIN, network=network(OBSERVATION.size), arguments=arguments
+    )
+    path = saved.save(tmp_path / "walker.npz")
+    assert SavedPolicy.read(path).arguments == arguments == arguments_of(path, WALKING)
+    with pytest.raises(ValueError, match=message):
+        load_policy(path, make(WALKING, **made))
+    needed = make(WALKING, **arguments)
+    assert load_policy(path, needed).act(needed.reset(seed=0)[0]) in needed.action_space
+
+
+def test_a_file_from_before_there_were_arguments_is_one_of_power(tmp_path):
+    path = POLICIES["gait"].save(tmp_path / "walk.json")
+    header = json.loads(path.read_text())
+    del header["arguments"]
+    path.write_text(json.dumps(header))
+    assert SavedPolicy.read(path) == POLICIES["gait"]
+    assert SavedPolicy.read(path).arguments == {"action": "power"}
+
+
 def test_every_shipped_policy_can_be_loaded():
     for name, path in files.shipped().items():
         saved = SavedPolicy.read(path)
-        policy = load_policy(name, gym.make(saved.task))
+        policy = load_policy(name, make(saved.task, **saved.arguments))
         policy.reset()
         assert saved.origin.command and Path(path).suffix == files.KINDS[saved.kind]
 
@@ -228,10 +270,10 @@ def test_a_gait_with_rows_for_every_leg_is_the_same_gait():
     [
         ({"hot": ((1.0, 2.0, 3.0),) * 3}, "hot must have 1 or 4 rows, got 3"),
         ({"hot": ((1.0, 2.0),) * 4}, "hot must have 3 numbers per leg, got 2"),
-        ({"duty": ((0.5, 0.5, 0.5), (0.5, 1.5, 0.5)) * 2}, "duty must be between 0 and 1"),
+        ({"duty": ((0.5, 0.5, 0.5), (0.5, 1.5, 0.5)) * 2}, "duty must be finite and at least 0"),
         ({"warm": ((200.0, 25.0, 25.0),) * 4}, "warm must be at most hot"),
         ({"offset": ((0.0, 0.0), (0.0, 0.0))}, "offset must be a row"),
-        ({"start": ((0.0, 0.1), (0.0,))}, "start must be rows of finite numbers of one length"),
+        ({"start": ((0.0, 0.1), (0.0,))}, "start must be a real number or an array"),
     ],
 )
 def test_impossible_gaits_are_refused(change, message):

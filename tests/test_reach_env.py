@@ -15,7 +15,7 @@ from tca_mj.control import Thermostat
 from tca_mj.envs.hanging import NoRest
 from tca_mj.envs.reach import ACTION, OBSERVATION, BendReach
 from tca_mj.modules.bending import BendingSpec
-from tca_mj.render import RenderingUnavailable
+from tca_mj.record.render import RenderingUnavailable
 from tca_mj.variation import Variation
 
 ID = "TCA/BendReach-v0"
@@ -26,7 +26,7 @@ FULL = np.full(ACTION.size, 1.0, dtype=np.float32)
 @pytest.fixture(scope="module")
 def shared():
     """One environment for the tests that reset it; that resets forget everything is a test too."""
-    return BendReach()
+    return BendReach(action="power")
 
 
 def rollout(env, seed=7, steps=5, **options):

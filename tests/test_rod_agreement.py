@@ -1,4 +1,4 @@
-"""Two solvers that share no equation find the same shapes: balance of sections, least energy."""
+"""Two solvers that share the energy of a section and no more find the same shapes."""
 
 import numpy as np
 import pytest

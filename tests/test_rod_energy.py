@@ -11,11 +11,12 @@ from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 from scipy.special import ellipe, ellipk
 
+from tca_mj.quadrature import GaussRule
 from tca_mj.rod import BeamSpec, RodSolveError, Segment
-from tca_mj.rod.energy import minimise
-from tca_mj.rod.mesh import Mesh
-from tca_mj.rod.motion import GaussRule, Pieces
-from tca_mj.rod.potential import Potential
+from tca_mj.rod.energy.mesh import Mesh
+from tca_mj.rod.energy.motion import Pieces
+from tca_mj.rod.energy.potential import Potential
+from tca_mj.rod.energy.solver import minimise
 from tca_mj.rod.problem import StaticProblem
 from tca_mj.routes import Helix, UTurn, parallel
 
@@ -325,5 +326,3 @@ def test_what_has_no_solution_is_refused_with_the_residual():
     )
     with pytest.raises(RodSolveError, match="not smooth"):
         shape([SimpleNamespace(legs=(kinked,))], [0.01])
-    with pytest.raises(ValueError, match="points"):
-        shape(points=1)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tca_mj.model import settle
-from tca_mj.model.chain import beam
+from tca_mj.model.chain import add_chain
 from tca_mj.model.part import Part, new_spec
 from tca_mj.model.tendon import route_passes, route_tca
 from tca_mj.modules.bending import BendingSpec, bending_module
@@ -16,7 +16,6 @@ from tca_mj.modules.finger import finger_pair
 from tca_mj.routes import Helix, leg_length
 from tca_mj.sim import Simulation, SimulationDiverged, SimulationOverheated
 from tca_mj.tca import CATALOGUE, FibreSpec, HeatStep
-from tca_mj.tca.calibration import _calibrated
 
 
 def simulation(**options):
@@ -194,7 +193,7 @@ def test_at_rest_it_has_the_shape_that_settle_finds():
     body = replace(BendingSpec().body, curvature=(10.0, -30.0, 5.0))
     routes = (Helix(4e-3), Helix(4e-3, 0.5, 2.0))
     spec = new_spec("curved")
-    chain = beam(spec.worldbody, body, nodes=8, name="body")
+    chain = add_chain(spec.worldbody, body, nodes=8, name="body")
     chain.tip.add_site(name="tip", pos=[0.0, 0.0, chain.local(8)])
     tcas = []
     for i, route in enumerate(routes):
@@ -222,7 +221,7 @@ def test_robots_use_the_surface_and_the_rod_where_there_is_none():
     """Steep and soft in torsion: that coil's own tension falls with length."""
     assert simulation().bank.law == "surface"
     assert simulation(law="rod").bank.law == "rod"
-    with pytest.raises(ValueError, match="law = 'table' must be 'rod' or 'surface'"):
+    with pytest.raises(ValueError, match="law must be 'rod' or 'surface', got 'table'"):
         simulation(law="table")
     part = bending_module()
     fibre = FibreSpec(radius=0.2e-3, young=7e9, shear=0.1e9)
@@ -245,19 +244,6 @@ def test_surface_and_rod_move_a_body_alike():
         courses.append(np.array(course))
     moved = np.linalg.norm(np.diff(courses[0], axis=0), axis=1).min()
     assert np.abs(courses[1] - courses[0]).max() < 1e-4 * moved
-
-
-def test_a_table_from_a_file_moves_a_body_as_a_new_one(tmp_path, monkeypatch):
-    """Bit for bit: built and not kept, built and kept, read from the file, from memory."""
-    ends = []
-    for folder in (tmp_path / "no folder" / "file", tmp_path / "cache", tmp_path / "cache"):
-        (tmp_path / "no folder").touch()
-        monkeypatch.setenv("XDG_CACHE_HOME", str(folder))
-        _calibrated.cache_clear()
-        ends += [rollout(simulation()), rollout(simulation())]
-    assert len(list(tmp_path.glob("cache/tca-mj/*.bin"))) == 1
-    assert not list(tmp_path.glob("no folder/**/*"))
-    assert set(ends) == {ends[0]}
 
 
 def rollout(sim):
@@ -336,9 +322,9 @@ def test_a_tca_outside_of_its_law_is_a_divergence(stretch):
 @pytest.mark.parametrize(
     ("power", "duration", "message"),
     [
-        (np.zeros(2), 0.1, r"power must have shape \(3,\), got \(2,\)"),
-        (0.0, 0.1, r"power must have shape \(3,\), got \(\)"),
-        ([0.0, -0.1, 0.0], 0.1, r"power must be .* at least 0 W, got \[ 0\.  -0\.1  0\. \]"),
+        (np.zeros(2), 0.1, r"power must be finite numbers of shape \(3,\), got"),
+        (0.0, 0.1, r"power must be finite numbers of shape \(3,\), got 0\.0"),
+        ([0.0, -0.1, 0.0], 0.1, r"power must be .* at least 0 W, got \[0\.0, -0\.1, 0\.0\]"),
         ([0.0, math.nan, 0.0], 0.1, r"power must be finite .* got .*nan"),
         ([0.0, math.inf, 0.0], 0.1, r"power must be finite .* got .*inf"),
         (np.zeros(3), 0.11, r"duration must be a positive multiple of tca_period 0\.02 s, got 0"),
@@ -365,8 +351,8 @@ def test_a_bad_step_is_refused_and_changes_nothing(power, duration, message):
         ({"timestep": 3e-3}, r"tca_period must be a positive multiple .* 0\.003 s, got 0\.02"),
         ({"tca_period": 0.0}, r"tca_period must be a positive multiple .*, got 0\.0"),
         ({"tca_period": math.nan}, "tca_period must be a positive multiple .*, got nan"),
-        ({"ambient": -300.0}, r"ambient = -300\.0 must lie strictly between"),
-        ({"ambient": math.nan}, "ambient = nan must lie strictly between"),
+        ({"ambient": -300.0}, r"ambient must be .* above -273\.15, got -300\.0"),
+        ({"ambient": math.nan}, "ambient must be finite and above .*, got nan"),
     ],
 )
 def test_a_bad_simulation_is_refused(options, message):

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from tca_mj.model.chain import beam
+from tca_mj.model.chain import add_chain
 from tca_mj.model.part import new_spec
 from tca_mj.model.smooth import SmoothBody
 from tca_mj.model.tendon import route_passes, route_tca
@@ -26,7 +26,7 @@ TCA = Helix(4e-3)
 def model_of(routes, body=BEAM, nodes=5, **options):
     """A chain with TCAs in MuJoCo, some tensions, and its smooth body."""
     spec = new_spec("test")
-    chain = beam(spec.worldbody, body, nodes=nodes, name="body", **options)
+    chain = add_chain(spec.worldbody, body, nodes=nodes, name="body", **options)
     tcas = []
     for i, route in enumerate(routes):
         length = sum(leg_length(leg, body.length, body.curvature) for leg in route.legs)

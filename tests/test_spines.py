@@ -7,7 +7,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from tca_mj.model.chain import MOTIONS, beam
+from tca_mj.model.chain import MOTIONS, add_chain
 from tca_mj.model.part import Part, new_spec
 from tca_mj.model.spine import SHEAR_RATIO, RoutedSpine, lumped_torsion, route_spine
 from tca_mj.model.tendon import route_passes, route_tca
@@ -36,7 +36,7 @@ def piece(motions=MOTIONS, name="spine"):
     )  # fmt: skip
     mjspec = new_spec("piece")
     mjspec.option.gravity = [0.0, 0.0, 0.0]
-    chain = beam(mjspec.worldbody, body, nodes=NODES, name=name, motions=motions)
+    chain = add_chain(mjspec.worldbody, body, nodes=NODES, name=name, motions=motions)
     route = UTurn.parallel(SPINE.tca_offset, 1.6e-3, -math.pi / 2.0)
     tca = CATALOGUE["free-stroke"].of_length(2.0 * SPINE.length)
     routed = route_tca(mjspec, tca, route_passes(chain, route), name="tca")
@@ -302,7 +302,7 @@ def test_bad_torsions_are_refused():
     spec = new_spec("test")
     body = BeamSpec(length=SPINE.length, bending=(OWN, OWN), torsion=OWN, stretching=1.0,
                     shearing=1.0, line_density=0.03, outline=Outline(4e-3, 4e-3))  # fmt: skip
-    chain = beam(spec.worldbody, body, nodes=NODES, name="spine")
+    chain = add_chain(spec.worldbody, body, nodes=NODES, name="spine")
     with pytest.raises(ValueError, match="one number or 3"):
         route_spine(SPINE, HEATER, [chain], name="spine", tca="tca", torsion=(1e-12,) * 2)
     with pytest.raises(ValueError, match=r"torsion\[1\]"):

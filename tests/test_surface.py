@@ -6,7 +6,6 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 
-import tca_mj.tca.calibration as calibration
 from tca_mj.tca import (
     CATALOGUE,
     BodyHeat,
@@ -23,15 +22,6 @@ FREE_STROKE = CATALOGUE["free-stroke"]
 HOT_SECTION = replace(FREE_STROKE, fibre=replace(FREE_STROKE.fibre, section="hot"), ambient=20.0)
 SPECS = [*CATALOGUE.values(), HOT_SECTION]
 IDS = [*CATALOGUE, "free-stroke with hot section"]
-
-
-@pytest.fixture(autouse=True)
-def own_cache(tmp_path, monkeypatch):
-    """Every test has an empty cache folder, and memory keeps nothing between tests."""
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    calibration._calibrated.cache_clear()
-    yield
-    calibration._calibrated.cache_clear()
 
 
 def random_points(spec, count, seed=0, hottest=180.0):
@@ -252,11 +242,10 @@ def test_a_batch_is_its_rows_bit_for_bit(contiguous):
             np.testing.assert_array_equal(getattr(row_pull, name), getattr(pull, name)[i])
 
 
-def test_a_bank_is_its_tcas_bit_for_bit_whoever_built_the_surfaces(tmp_path):
+def test_a_bank_is_its_tcas_bit_for_bit():
     bank = TcaBank(SPECS, law="surface")
     state, _, length = random_inputs(bank, (), seed=3)
     pull = bank.pull(state, length)
-    calibration._calibrated.cache_clear()  # from now on they come from files
     for i, spec in enumerate(SPECS):
         alone = TcaBank([spec], law="surface").pull(
             TcaState(*(getattr(state, f.name)[i : i + 1] for f in fields(state))),

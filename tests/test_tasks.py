@@ -2,6 +2,8 @@
 
 from pathlib import Path
 
+import gymnasium as gym
+import numpy as np
 import pytest
 
 from tca_mj.envs.morph import OBSERVATION, MorphModule
@@ -58,3 +60,43 @@ def test_what_is_not_kept_is_said(monkeypatch, check, attribute, planted, said):
 def test_a_task_that_does_not_exist_is_no_task():
     with pytest.raises(ValueError, match="task must be one of"):
         check_task("TCA/Nothing-v0")
+
+
+# Options that make the start of an episode its own mirror image, and those of the mirror image.
+MIRRORED = {
+    "TCA/BendReach-v0": ({"rise": [0.3, 0.8, 0.1]}, {"rise": [0.3, 0.1, 0.8]}),
+    "TCA/TetrapodCourse-v0": ({"position": [0.0, 2e-3], "yaw": 0.02},
+                              {"position": [0.0, -2e-3], "yaw": -0.02}),
+    **{
+        f"TCA/Tetrapod{gait}-v0": ({"yaw": yaw, "bend": bend, "direction": direction},
+                                   {"yaw": -yaw, "bend": bend, "direction": -direction})
+        for gait, bend, yaw, direction in (
+            ("Crawl", 0.35, 0.02, 0.7), ("Walk", 1.62, 0.02, -0.4), ("Shimmy", 3.75, 0.0, 0.0),
+        )
+    },
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("id", MIRRORED)
+def test_the_mirror_that_a_task_declares_is_that_of_its_physics(id):
+    """Mirrored actions from the mirrored start lead to mirrored observations."""
+    one, other = (gym.make(id, disable_env_checker=True).unwrapped for _ in range(2))
+    seen, image = (
+        task.reset(seed=0, options=options)[0]
+        for task, options in zip((one, other), MIRRORED[id], strict=True)
+    )
+    random = np.random.default_rng(0)
+    for number in range(12):
+        assert one.observation.mirrored(seen) == pytest.approx(image, rel=1e-4, abs=1e-5), number
+        action = random.uniform(-1.0, 1.0, one.action.size).astype(np.float32)
+        seen, *_ = one.step(action)
+        image, *_ = other.step(one.action.mirrored(action))
+
+
+@pytest.mark.parametrize("id", [task.id for task in TASKS])
+def test_every_task_says_whether_left_and_right_are_alike(id):
+    task = gym.make(id, disable_env_checker=True).unwrapped
+    assert task.observation.symmetric == task.action.symmetric == (id in MIRRORED)
+    if id not in MIRRORED:
+        with pytest.raises(ValueError, match="mirror"):
+            task.action.mirrored(task.action.still)

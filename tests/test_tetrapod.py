@@ -11,7 +11,7 @@ import pytest
 
 from tca_mj.certify.rest import Load, rest
 from tca_mj.model.spine import SHEAR_RATIO, lumped_torsion
-from tca_mj.modules.leg import LegSpec, continuum_leg
+from tca_mj.modules.continuum_leg import LegSpec, continuum_leg
 from tca_mj.robots.tetrapod import (
     LEGS,
     SIDES,

@@ -13,7 +13,7 @@ from tca_mj.envs.options import variation_of
 from tca_mj.envs.stance import CAMERAS
 from tca_mj.envs.tetrapod import ACTION, OBSERVATION, TASKS, TetrapodGait
 from tca_mj.envs.wrappers import RecordRerun
-from tca_mj.render import RenderingUnavailable
+from tca_mj.record.render import RenderingUnavailable
 from tca_mj.robots.tetrapod import LEGS
 from tca_mj.variation import Variation
 
@@ -25,7 +25,7 @@ VARIED = {"randomise": 0.2}
 @pytest.fixture(scope="module")
 def envs():
     """One environment of each task; that resets forget everything is a test too."""
-    return {gait: TetrapodGait(gait=gait) for gait in TASKS}
+    return {gait: TetrapodGait(gait=gait, action="power") for gait in TASKS}
 
 
 @pytest.fixture
@@ -181,7 +181,7 @@ def test_the_observation_is_what_the_simulation_says(walker):
     # The body is rigid: its spines need neither heaters nor TCAs.
     assert info["energy"].shape == info["temperature"].shape == info["tension"].shape == (12,)
     assert info["heater_energy"].shape == (0,)
-    fine = TetrapodGait(body="fine", timestep=2e-3)
+    fine = TetrapodGait(action="power", body="fine", timestep=2e-3)
     _, info = fine.reset(seed=0)
     assert info["energy"].shape == (15,) and info["heater_energy"].tolist() == [0.0] * 3
 
@@ -380,7 +380,9 @@ def test_a_rigid_body_is_as_good_as_an_elastic_one():
     """And shimmies, as on single spines, which is what lets it."""
     for gait, steps in (("walk", 60), ("shimmy", 150)):
         distance = [
-            follow(TetrapodGait(gait=gait, body=body), gait_policy(gait), steps)[-1]["distance"]
+            follow(
+                TetrapodGait(gait=gait, action="power", body=body), gait_policy(gait), steps
+            )[-1]["distance"]
             for body in ("rigid", "elastic")
         ]
         assert distance[0] > 5e-3
@@ -392,7 +394,8 @@ def test_the_walk_does_not_hang_on_the_time_step():
     """Nor on contacts that chatter: distances after a cycle and a half at 5 and 2.5 ms."""
     policy = gait_policy("walk")
     distance = [
-        follow(TetrapodGait(timestep=dt), policy, 90)[-1]["distance"] for dt in (5e-3, 2.5e-3)
+        follow(TetrapodGait(action="power", timestep=dt), policy, 90)[-1]["distance"]
+        for dt in (5e-3, 2.5e-3)
     ]
     assert distance[0] == pytest.approx(distance[1], rel=0.1)
 
@@ -440,7 +443,8 @@ def test_contacts_do_not_make_the_speed(envs, gait):
     """Contacts without a layer, at a fifth of the step, and a layer twice as thick: within 5 %."""
     distance = []
     for change in (None, "hard", "thick"):
-        env = TetrapodGait(gait=gait, timestep=1e-3 if change == "hard" else 5e-3)
+        timestep = 1e-3 if change == "hard" else 5e-3
+        env = TetrapodGait(gait=gait, action="power", timestep=timestep)
         model = env.sim.model
         mine = np.flatnonzero(model.geom_priority > 0)
         if change == "hard":  # gives under a foot's load as much as a ball of silicone

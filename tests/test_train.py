@@ -111,7 +111,8 @@ train(TrainConfig(learner=OnPolicy(**eval(sys.argv[2])), **eval(sys.argv[1])), P
 @pytest.mark.usefixtures("quiet")
 def test_a_correction_of_a_gait_goes_on_too(tmp_path, monkeypatch):
     monkeypatch.setattr(gym.spec(WALK), "max_episode_steps", 7)
-    config = tiny("ppo", task=WALK, steps=40, residual=10.0, interval=20, evaluate_every=9)
+    config = tiny("ppo", task=WALK, steps=40, residual=10.0, interval=20, evaluate_every=9,
+                  arguments={"action": "power"})  # fmt: skip
     train(config, tmp_path / "whole", progress=False)
     save = Run.save
 
@@ -125,7 +126,7 @@ def test_a_correction_of_a_gait_goes_on_too(tmp_path, monkeypatch):
     monkeypatch.setattr(Run, "save", save)
     train(config, tmp_path / "parts", progress=False)
     assert written(tmp_path / "parts") == written(tmp_path / "whole")
-    env = gym.make(WALK)
+    env = gym.make(WALK, **config.arguments)
     policy = load_policy(tmp_path / "parts" / "best.npz", env)
     assert isinstance(policy, ResidualPolicy) and policy.bound == 10.0
     assert env.action_space.contains(policy.act(env.reset(seed=0)[0]))
@@ -171,9 +172,9 @@ def test_an_exported_network_acts_as_the_learner_does(algorithm):
 
 def test_the_residual_learner_sees_and_does_what_the_policy_will():
     """A correction of nothing is the gait; the clock starts anew with every episode."""
-    env = LearningEnv(TaskVecEnv.make(WALK, 2, max_episode_steps=4), GAIT,
-                      20.0)  # fmt: skip
-    single, script = gym.make(WALK, max_episode_steps=4), gait_policy("walk")
+    told = {"max_episode_steps": 4, "action": "power"}
+    env = LearningEnv(TaskVecEnv.make(WALK, 2, **told), GAIT, 20.0)
+    single, script = gym.make(WALK, **told), gait_policy("walk")
     env.seed(3)
     seen = env.reset()
     observation, _ = single.reset(seed=3)

@@ -11,18 +11,19 @@ import pytest
 from scipy.optimize import brentq
 
 from tca_mj import cli
-from tca_mj.tca import CATALOGUE
+from tca_mj.tca import CATALOGUE, Load, LoadedTcas
 from tca_mj.tca.catalogue import MODULE_TCAS
-from tca_mj.tca.dynamics import Load, LoadedTcas
-from tca_mj.tca.sensing import SensingSpec
+from tca_mj.tca.sensing.wire import SensingSpec
 from tca_mj.tca.thermal import step_temperature
 from tca_mj.validation import (
     creeping,
     drag,
     heat,
     lifting,
+    modules,
     race,
     report,
+    sensors,
     strokes,
     theories,
     threads,
@@ -34,7 +35,13 @@ PAGE = Path(__file__).resolve().parent.parent / "docs" / "validation.md"
 
 @pytest.fixture(scope="module")
 def cheap():
-    return report.cheap_findings()
+    """The findings that take some seconds: no scans, control, cone or timing."""
+    return [
+        *strokes.free_strokes(), *strokes.contact_stops(), *strokes.loaded_contractions(),
+        *strokes.loaded_stroke(), *strokes.overlap(), *drag.findings(), *race.fastest(),
+        *creeping.findings(), *heat.findings(), *sensors.findings(), *theories.moduli(),
+        *theories.spread(), *theories.dynamics(dt=0.05), *modules.findings(full=False),
+    ]  # fmt: skip
 
 
 def verdicts(findings):
@@ -293,13 +300,13 @@ def test_the_catalogue_is_the_candidate_that_is_in_use():
         assert same.heat.capacity == tca.heat.capacity
         assert same.resistance_per_length == pytest.approx(tca.resistance_per_length, rel=1e-9)
         assert same.contraction_resistance == tca.contraction_resistance
-    in_use = threads.THREADS[0]
+    in_use = threads.THREADS["one thread (in use)"]
     assert in_use.tca("type-1-180") == CATALOGUE["type-1-180"]
 
 
 def test_one_thread_holds_more_than_two():
-    one, two = (sum(threads.facts(threads.THREADS[k]).held) for k in (0, 4))
-    assert threads.THREADS[4].words.startswith("two threads (before")
+    names = "one thread (in use)", "two threads (before)"
+    one, two = (sum(threads.facts(threads.THREADS[name]).held) for name in names)
     assert one == 8 and two == 4
 
 
@@ -329,11 +336,10 @@ def test_tcas_of_the_modules():
 @pytest.fixture
 def quick(monkeypatch, cheap):
     """A report without its long runs: the same writing, some of the facts."""
-    monkeypatch.setattr(report.Runs, "now", classmethod(lambda cls: None))
     chapters = dict.fromkeys(report._CHAPTERS, cheap[:2])
-    monkeypatch.setattr(report, "all_findings", lambda runs: chapters)
+    monkeypatch.setattr(report, "all_findings", lambda: chapters)
     monkeypatch.setattr(report, "all_tables", lambda: {"Heat and resistance": "| a table |"})
-    monkeypatch.setattr(report, "draw_figures", lambda runs, out: (out / "drawn").touch())
+    monkeypatch.setattr(report, "draw_figures", lambda out: (out / "drawn").touch())
 
 
 def test_the_command_prints_and_writes(quick, tmp_path, capsys):

@@ -11,8 +11,8 @@ from gymnasium.error import ResetNeeded
 from gymnasium.vector import AutoresetMode, SyncVectorEnv
 
 from tca_mj.envs.vector import TaskVector
+from tca_mj.record.render import RenderingUnavailable
 from tca_mj.registry import TASKS
-from tca_mj.render import RenderingUnavailable
 
 IDS = [task.id for task in TASKS]
 QUICK = "TCA/MorphModule-v0"  # the task whose step takes a millisecond

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from tca_mj.envs.tetrapod import TetrapodGait
-from tca_mj.modules.leg import LegSpec
+from tca_mj.modules.continuum_leg import LegSpec
 from tca_mj.tca import step_temperature
 
 SCRIPT = runpy.run_path(str(Path(__file__).parent.parent / "scripts" / "walk_limit.py"))

@@ -1,4 +1,4 @@
-"""Recording through the wrapper: nothing changes but that there is a file, and it is whole."""
+"""Recording changes nothing but that there is a file, and it is whole; scaling only numbers."""
 
 import json
 import subprocess
@@ -15,7 +15,7 @@ from rerun.chunk import RrdReader
 
 from tca_mj.envs.arm import ArmPickPlace
 from tca_mj.envs.task import how_it_ended
-from tca_mj.envs.wrappers import RecordRerun
+from tca_mj.envs.wrappers import RecordRerun, ScaledObservation, VectorScaledObservation
 
 
 @pytest.fixture(scope="module")
@@ -126,7 +126,7 @@ def test_a_program_that_never_closes_leaves_a_whole_file(tmp_path: Path, ending:
 import sys
 import numpy as np
 from tca_mj.envs.arm import ArmPickPlace
-from tca_mj.envs.wrappers import RecordRerun
+from tca_mj.envs.wrappers import RecordRerun, ScaledObservation, VectorScaledObservation
 env = RecordRerun(ArmPickPlace(), {json.dumps(str(tmp_path / "a.rrd"))})
 env.reset(seed=0)
 for _ in range(3):
@@ -175,3 +175,70 @@ def test_the_end_of_an_episode_has_a_reason(
     terminated: bool, truncated: bool, info: dict[str, Any], said: str | None
 ) -> None:
     assert how_it_ended(terminated, truncated, info) == said
+
+
+QUICK = "TCA/MorphModule-v0"
+
+
+def by_hand(task: Any, observation: Any) -> Any:
+    """(x - centre) / scale, row by row of the table."""
+    rows = []
+    for entry in task.observation.entries:
+        scale = entry.scale if entry.scale is not None else (entry.high - entry.low) / 2.0
+        rows.append((observation[task.observation.slices[entry.name]] - entry.centre) / scale)
+    return np.concatenate(rows)
+
+
+def test_scaled_observations_are_those_of_the_table() -> None:
+    plain = gym.make("TCA/BendReach-v0")
+    env = ScaledObservation(gym.make("TCA/BendReach-v0"))
+    task: Any = plain.unwrapped
+    low, high = plain.observation_space.low, plain.observation_space.high  # type: ignore[attr-defined]
+    np.testing.assert_allclose(env.observation_space.low, by_hand(task, low), rtol=1e-6)
+    np.testing.assert_allclose(env.observation_space.high, by_hand(task, high), rtol=1e-6)
+    seen, (scaled, _) = plain.reset(seed=2)[0], env.reset(seed=2)
+    action = np.array([0.5, -1.0, 0.0], dtype=np.float32)
+    for _ in range(20):
+        assert scaled in env.observation_space and scaled.dtype == np.float32
+        np.testing.assert_allclose(scaled, by_hand(task, seen), rtol=1e-5, atol=1e-6)
+        seen, reward, *_ = plain.step(action)
+        scaled, other, *_ = env.step(action)
+        assert reward == other
+    assert 0.3 < np.abs(scaled).max() < 5.0
+    again = gym.make(gym.envs.registration.EnvSpec.from_json(env.spec.to_json()))  # type: ignore[union-attr]
+    assert isinstance(again, ScaledObservation)
+
+
+@pytest.mark.parametrize("mode", ["SameStep", "NextStep"])
+def test_scaled_vector_environments_are_the_scaled_single_ones(mode: str) -> None:
+    """Also the last observations of episodes that a time limit ends."""
+    told = {"max_episode_steps": 3, "autoreset_mode": mode}
+    plain = gym.make_vec(QUICK, num_envs=2, **told)
+    envs = VectorScaledObservation(gym.make_vec(QUICK, num_envs=2, **told))
+    single = ScaledObservation(gym.make(QUICK))
+    assert envs.single_observation_space == single.observation_space
+    assert envs.observation_space.shape == (2, *(single.observation_space.shape or ()))
+    task: Any = single.unwrapped
+    seen, scaled = plain.reset(seed=[5, 6])[0], envs.reset(seed=[5, 6])[0]
+    np.testing.assert_array_equal(scaled[0], single.reset(seed=5)[0])
+    random, ends = np.random.default_rng(0), 0
+    for _ in range(8):
+        np.testing.assert_array_equal(scaled, task.observation.scaled(seen))
+        assert scaled in envs.observation_space
+        actions = random.uniform(-1.0, 0.0, (2, 3)).astype(np.float32)
+        seen, rewards, *_, infos = plain.step(actions)
+        scaled, others, *_, told_infos = envs.step(actions)
+        np.testing.assert_array_equal(rewards, others)
+        assert ("final_obs" in told_infos) == ("final_obs" in infos)
+        for i in np.flatnonzero(infos.get("_final_obs", [])):
+            np.testing.assert_array_equal(
+                told_infos["final_obs"][i], task.observation.scaled(infos["final_obs"][i])
+            )
+            assert np.abs(told_infos["final_obs"][i]).max() < 10.0
+            ends += 1
+    assert (ends >= 4) == (mode == "SameStep")
+
+
+def test_what_has_no_table_is_not_scaled() -> None:
+    with pytest.raises(ValueError, match="table of its observation"):
+        ScaledObservation(gym.make("CartPole-v1"))
