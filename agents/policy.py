@@ -28,6 +28,7 @@ from tca_mj.agents.network import Network
 from tca_mj.control import Gait
 from tca_mj.envs.task import HEATINGS
 from tca_mj.files import write_whole
+from tca_mj.registry import find_task
 
 FORMAT = 1
 KINDS = {"gait": ".json", "network": ".npz", "residual": ".npz"}
@@ -277,6 +278,7 @@ def require_arguments(arguments: Mapping[str, Any], env: Any) -> None:
     task: Any = env.unwrapped
     given = {"action": task.heating, "control_period": task.control_period}
     usual = {"action": HEATINGS[0], "control_period": type(task).control_period}
+    usual |= {} if env.spec is None else dict(find_task(env.spec.id).kwargs)
     for name, value in given.items():
         needed = arguments.get(name) or usual[name]
         if needed != value:

@@ -143,8 +143,8 @@ class TaskVector(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[Any
             errors = batch.step(drives, first.interval)
             for i, (env, drive, error) in enumerate(zip(self.envs, drives, errors, strict=True)):
                 if drive is not None:
-                    outcome = together(outcomes[i], env.finish(drive, error))
-                    outcomes[i], going[i] = outcome, not (outcome[2] or outcome[3])
+                    now = together(outcomes[i], env.finish(drive, error))
+                    outcomes[i], going[i] = now, not (now[2] or now[3])
             if not going.any():
                 break
         for i, outcome in enumerate(outcomes):

@@ -133,10 +133,12 @@ def episode_steps(task: str, control_period: float | None = None) -> int | None:
     Raises:
         ValueError: As ``find_task``.
     """
-    steps = find_task(task).max_episode_steps
+    spec = find_task(task)
+    steps = spec.max_episode_steps
     if steps is None or control_period is None:
         return steps
-    return max(1, round(steps * task_class(task).control_period / control_period))
+    own = spec.kwargs.get("control_period") or task_class(task).control_period
+    return max(1, round(steps * own / control_period))
 
 
 def make(task: str, *, max_episode_steps: int | None = None, **arguments: Any) -> Any:

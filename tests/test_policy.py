@@ -232,6 +232,26 @@ def test_a_policy_for_another_action_is_refused(arguments, made, message, tmp_pa
     assert load_policy(path, needed).act(needed.reset(seed=0)[0]) in needed.action_space
 
 
+def test_what_a_task_is_registered_with_needs_no_mention(tmp_path):
+    told = {"action": "power", "control_period": 0.2}
+    entry = "tca_mj.envs.tetrapod:TetrapodGait"
+    gym.register("Example/Slow-v0", entry_point=entry, max_episode_steps=50, kwargs=told)
+    try:
+        saved = SavedPolicy(
+            task="Example/Slow-v0", origin=ORIGIN, network=network(OBSERVATION.size), arguments={}
+        )
+        path = saved.save(tmp_path / "slow.npz")
+        env = make("Example/Slow-v0", **arguments_of(path, "Example/Slow-v0"))
+        assert env.unwrapped.heating == "power" and env.spec.max_episode_steps == 50
+        load_policy(path, env)
+        quick = make("Example/Slow-v0", control_period=0.1)
+        assert quick.spec.max_episode_steps == 100
+        with pytest.raises(ValueError, match="control_period must be 0.2 for this policy, got 0.1"):
+            load_policy(path, quick)
+    finally:
+        gym.registry.pop("Example/Slow-v0")
+
+
 def test_a_file_from_before_there_were_arguments_is_one_of_power(tmp_path):
     path = POLICIES["gait"].save(tmp_path / "walk.json")
     header = json.loads(path.read_text())

@@ -111,4 +111,4 @@ def summed(values: Array, place: NDArray[np.int64], size: int) -> Array:
 
 def rows(array: Array) -> tuple[Array, ...]:
     """The rows of the last axis but one, each of shape (..., k)."""
-    return tuple(array[..., i, :] for i in range(array.shape[-2]))
+    return tuple(array if array.ndim == 2 else np.moveaxis(array, -2, 0))
