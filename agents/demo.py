@@ -7,9 +7,9 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 
-from tca_mj.agents.actors import actor, arguments_of
 from tca_mj.agents.episode import RECORDING, Episode
-from tca_mj.agents.policy import Policy
+from tca_mj.agents.policies import Policy
+from tca_mj.agents.policies.actors import actor, arguments_of
 from tca_mj.envs.wrappers import RecordRerun
 from tca_mj.registry import make
 
@@ -36,7 +36,7 @@ def play(
 
     Args:
         task: Gymnasium id, or ``module:id``.
-        policy: Who acts: a policy, or what ``tca_mj.agents.actors.actor`` knows by name.
+        policy: Who acts: a policy, or what ``tca_mj.agents.policies.actors.actor`` knows by name.
         seed: Seed of the episode.
         options: Options of the reset.
         arguments: Of the task; None for what a policy with a name needs, else the task's own.

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from tca_mj.agents.policy import Policy
+from tca_mj.agents.policies import Policy
 from tca_mj.envs.task import Headway, how_it_ended
 from tca_mj.envs.wrappers import RecordRerun
 from tca_mj.files import write_whole

@@ -22,9 +22,9 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 import tca_mj  # noqa: F401  (registers the tasks in a new process)
-from tca_mj.agents.actors import NAMES, actor, arguments_of, best_of
 from tca_mj.agents.design import robot_of
-from tca_mj.agents.policy import find
+from tca_mj.agents.policies import find
+from tca_mj.agents.policies.actors import NAMES, actor, arguments_of, best_of
 from tca_mj.agents.rollout import rollout
 from tca_mj.envs.task import how_it_ended
 from tca_mj.files import write_whole
@@ -57,7 +57,7 @@ class Evaluation:
 
     Attributes:
         task: Gymnasium id, or ``module:id``.
-        policy: Who acts, see ``tca_mj.agents.actors.actor``.
+        policy: Who acts, see ``tca_mj.agents.policies.actors.actor``.
         episodes: How many episodes, at least 1.
         seed: Seed of the first one; the others follow.
         randomise: Share by which the robot is off, the task's option ``randomise``; 0 is nominal.

@@ -8,7 +8,7 @@ import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
-from tca_mj.agents.policy import Policy
+from tca_mj.agents.policies import Policy
 
 
 @dataclass(frozen=True, slots=True)

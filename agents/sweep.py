@@ -112,12 +112,12 @@ class Trial:
         task = self.sweep.evaluation.task
         try:
             if self.sweep.algorithm == "cma":
-                from tca_mj.agents.search import SearchConfig
+                from tca_mj.agents.train.search import SearchConfig
 
                 return SearchConfig(**{"task": task, **change})
             if self.sweep.algorithm is None:
                 return None
-            from tca_mj.agents.config import default_config
+            from tca_mj.agents.train.config import default_config
 
             inner = {name.removeprefix("learner."): change.pop(name)
                      for name in list(change) if name.startswith("learner.")}  # fmt: skip
@@ -131,11 +131,11 @@ class Trial:
         config = self.config()
         if config is not None:
             if self.sweep.algorithm == "cma":
-                from tca_mj.agents.search import search
+                from tca_mj.agents.train.search import search
 
                 search(config, folder, workers=1, progress=False)
             else:
-                from tca_mj.agents.train import train
+                from tca_mj.agents.train.deep import train
 
                 train(config, folder, video=False, progress=False)
         summary = evaluate(self.evaluation(folder), out=folder / "evaluation", progress=False)

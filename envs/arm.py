@@ -102,7 +102,7 @@ class ArmPickPlace(SimulatedTask):
     terms = ("reach", "carry", "energy", "place")
     energy_price = 0.002
     cameras = ("front", "side", "close")
-    scripted = "tca_mj.agents.scripted:scripted"
+    scripted = "tca_mj.agents.scripts.arm:scripted"
     scripted_arguments = {"action": "power"}
     robot_argument = ("arm_spec", ArmSpec)
     film_speed = 4.0

@@ -139,7 +139,7 @@ class TetrapodCourse(SimulatedTask):
     terms = ("progress", "touch", "damage", "finish", "energy")
     energy_price = 1e-5
     cameras = (*CAMERAS, "overview")
-    scripted = "tca_mj.agents.course:CourseWalker"
+    scripted = "tca_mj.agents.scripts.course:CourseWalker"
     scripted_arguments = {"action": "power"}
     robot_argument = ("robot", _default)
     film_speed = 30.0

@@ -98,7 +98,7 @@ class MorphModule(SimulatedTask):
     terms = ("reach", "fix", "goal", "energy", "damage")
     energy_price = 0.01
     camera_prefix = "stand."
-    scripted = "tca_mj.agents.morph:scripted"
+    scripted = "tca_mj.agents.scripts.morph:scripted"
     scripted_arguments = {"action": "power"}
     robot_argument = ("module_spec", _default)
 

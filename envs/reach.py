@@ -97,7 +97,7 @@ class BendReach(SimulatedTask):
     terms = ("reach", "goal", "energy", "heat", "end")
     energy_price, heat_price, end_price = 0.02, 0.002, 5.0
     camera_prefix = "stand."
-    scripted = "tca_mj.agents.reach:scripted"
+    scripted = "tca_mj.agents.scripts.reach:scripted"
     scripted_arguments = {"action": "power"}
     robot_argument = ("module_spec", BendingSpec)
     learning_steps = {"ppo": 60_000, "sac": 60_000}

@@ -130,7 +130,7 @@ class TetrapodGait(SimulatedTask):
     terms = ("progress", "drift", "posture", "energy", "heat", "end")
     energy_price, heat_price, end_price = 0.002, 0.002, 5.0
     cameras = CAMERAS  # all follow the robot
-    scripted = "tca_mj.agents.tetrapod_gaits:scripted"
+    scripted = "tca_mj.agents.scripts.tetrapod:scripted"
     scripted_arguments = {"action": "power"}
     robot_argument = ("robot", TetrapodSpec)
     finer = {"legs": _fine_legs, "fine": _fine_body}

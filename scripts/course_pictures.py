@@ -12,8 +12,8 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from tca_mj.agents.course import CourseWalker
-from tca_mj.agents.tetrapod_gaits import gait_policy
+from tca_mj.agents.scripts.course import CourseWalker
+from tca_mj.agents.scripts.tetrapod import gait_policy
 from tca_mj.envs.course import TetrapodCourse
 from tca_mj.envs.tetrapod import TetrapodGait
 from tca_mj.record.render import Offscreen, colour_tendons

@@ -18,7 +18,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from shape_memory import shade, shown
 
-from tca_mj.agents.morph import MorphPolicy
+from tca_mj.agents.scripts.morph import MorphPolicy
 from tca_mj.control.morph import Measurement, Phase
 from tca_mj.envs.morph import MorphModule, hanging_module
 from tca_mj.modules.morphing import MorphingSpec, morphing_module

@@ -48,13 +48,7 @@ def at_rest(part: Part, temperature: Sequence[float]) -> Simulation:
     """
     part.spec.option.gravity = [0.0, 0.0, 9.81]
     sim = Simulation(part, timestep=4e-3)
-    target = np.asarray(temperature, dtype=np.float64)
-    for share in np.minimum(np.arange(1, 90) / 10, 1.0):  # warmed up in a second
-        now = 25.0 + share * (target - 25.0)
-        sim.step(sim.keep(now), 0.1)
-        if share == 1.0 and np.abs(sim.data.qvel).max() < AT_REST:
-            break
-    if np.abs(sim.data.qvel).max() > CREEP:
+    if sim.rest(temperature, longest=9.0, quiet=AT_REST) > CREEP:
         raise RuntimeError(f"at {temperature} °C the part does not come to rest")
     return sim
 

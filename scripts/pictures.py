@@ -11,7 +11,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from tca_mj.agents.scripted import PHASES, PickAndPlace
+from tca_mj.agents.scripts.arm import PHASES, PickAndPlace
 from tca_mj.envs.arm import ArmPickPlace
 from tca_mj.record.render import Offscreen, colour_tendons
 

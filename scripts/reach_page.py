@@ -14,7 +14,7 @@ from typing import Any
 import imageio.v3 as imageio
 import numpy as np
 
-from tca_mj.agents.reach import ReachPolicy
+from tca_mj.agents.scripts.reach import ReachPolicy
 from tca_mj.envs.hanging import NoRest, StaticTip
 from tca_mj.envs.reach import ACTION, BendReach
 from tca_mj.modules.bending import BendingSpec

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from tca_mj.agents.evaluate import EPISODES, METRICS, Evaluation, cell, evaluate, figures, kept
-from tca_mj.agents.policy import SavedPolicy, shipped
+from tca_mj.agents.policies import SavedPolicy, shipped
 from tca_mj.registry import TASKS, task_class
 
 ROOT = Path(__file__).resolve().parent.parent

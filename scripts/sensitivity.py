@@ -17,7 +17,7 @@ from unittest import mock
 import mujoco
 import numpy as np
 
-from tca_mj.agents.tetrapod_gaits import gait_policy
+from tca_mj.agents.scripts.tetrapod import gait_policy
 from tca_mj.envs.tetrapod import TetrapodGait
 from tca_mj.modules import continuum_leg as leg
 from tca_mj.modules.bending import BendingSpec, bending_module

@@ -122,15 +122,10 @@ def held(part: Part, temperature: Sequence[float]) -> Simulation:
     """A part with its TCAs at given temperatures [°C], once it moves no more."""
     for joint in part.spec.joints:  # of no influence on where it comes to rest
         joint.damping = 20.0 * np.asarray(joint.damping)
-    sim, target = Simulation(part, timestep=1e-2), np.asarray(temperature, dtype=np.float64)
-    before = sim.data.xpos.copy()
-    for share in np.minimum(np.arange(1, 200) / 10, 1.0):  # warmed up in a second
-        now = sim.bank.heat.ambient + share * (target - sim.bank.heat.ambient)
-        sim.step(sim.keep(now), 0.1)
-        if share == 1.0 and np.abs(sim.data.xpos - before).max() < 1e-8:
-            return sim
-        before = sim.data.xpos.copy()
-    raise RuntimeError(f"at {temperature} °C the part does not come to rest")
+    sim = Simulation(part, timestep=1e-2)
+    if sim.rest(temperature, quiet=1e-5) >= 1e-5:
+        raise RuntimeError(f"at {temperature} °C the part does not come to rest")
+    return sim
 
 
 def markdown(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:

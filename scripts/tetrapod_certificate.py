@@ -18,8 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from tca_mj.agents.policy import load_policy
-from tca_mj.agents.tetrapod_gaits import GAITS, gait_policy
+from tca_mj.agents.policies import load_policy
+from tca_mj.agents.scripts.tetrapod import GAITS, gait_policy
 from tca_mj.certify.rest import Load, rest
 from tca_mj.envs.tetrapod import TetrapodGait
 from tca_mj.model.part import Part

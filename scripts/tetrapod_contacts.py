@@ -24,8 +24,8 @@ from unittest.mock import patch
 import mujoco
 import numpy as np
 
-from tca_mj.agents.policy import load_policy
-from tca_mj.agents.tetrapod_gaits import GAITS, gait_policy
+from tca_mj.agents.policies import load_policy
+from tca_mj.agents.scripts.tetrapod import GAITS, gait_policy
 from tca_mj.envs.tetrapod import ACTION, TetrapodGait
 from tca_mj.machine import machine, versions
 from tca_mj.robots.tetrapod import LEGS

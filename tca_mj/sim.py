@@ -193,6 +193,40 @@ class Simulation:
         self.tca, power = self.bank.steady(temperature)
         return power
 
+    def rest(
+        self, temperature: ArrayLike, *, warming: float = 1.0, longest: float = 20.0,
+        quiet: float = 1e-6,
+    ) -> float:  # fmt: skip
+        """Warms the TCAs and waits until nothing moves any more: an equilibrium as a user finds it.
+
+        Commands are powers meanwhile, whatever ``bank.supply`` says.
+
+        Args:
+            temperature: Temperatures, shape (n,), not below the surroundings' [°C].
+            warming: Time in which they are led there [s].
+            longest: Time after which it ends at the latest, a multiple of 0.1 s [s].
+            quiet: Largest velocity of a joint with which it ends before [m/s, rad/s].
+
+        Returns:
+            The largest velocity of a joint that is left [m/s, rad/s].
+
+        Raises:
+            ValueError: As ``keep``; or as ``step``, if 0.1 s are no multiple of ``tca_period``.
+            SimulationDiverged: As ``step``.
+        """
+        ambient, left = np.asarray(self.bank.heat.ambient), np.inf
+        told, self.bank.supply = self.bank.supply, Supply()
+        try:
+            for time in 0.1 * np.arange(1, round(10.0 * longest) + 1):
+                share = min(time / warming, 1.0) if warming else 1.0
+                self.step(self.keep(ambient + share * (np.asarray(temperature) - ambient)), 0.1)
+                left = float(np.abs(self.data.qvel).max(initial=0.0))
+                if share == 1.0 and left < quiet:
+                    break
+        finally:
+            self.bank.supply = told
+        return left
+
     def _locate(self) -> None:
         """Computes positions and tendon lengths, and no more, from the joints."""
         mujoco.mj_kinematics(self.model, self.data)

@@ -13,7 +13,7 @@ import pytest
 
 from tca_mj import cli, registry
 from tca_mj.agents import demo
-from tca_mj.agents.actors import arguments_of
+from tca_mj.agents.policies.actors import arguments_of
 from tca_mj.bench import single, vector
 from tca_mj.cli.play import _policy
 from tca_mj.envs.arm import ArmPickPlace

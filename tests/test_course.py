@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
 
-from tca_mj.agents.course import (
+from tca_mj.agents.demo import play
+from tca_mj.agents.scripts.course import (
     CRAWL,
     HURRY,
     PUSH,
@@ -22,7 +23,6 @@ from tca_mj.agents.course import (
     Go,
     stages,
 )
-from tca_mj.agents.demo import play
 from tca_mj.cli import outcome, speed_table
 from tca_mj.envs.course import ACTION, OBSERVATION, TetrapodCourse
 from tca_mj.variation import Variation

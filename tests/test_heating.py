@@ -7,11 +7,11 @@ import mujoco
 import numpy as np
 import pytest
 
-from tca_mj.agents.actors import scripted
-from tca_mj.agents.course import CourseWalker
-from tca_mj.agents.gait_policy import GaitPolicy
-from tca_mj.agents.sb3_env import TaskVecEnv
-from tca_mj.agents.tetrapod_gaits import WALK
+from tca_mj.agents.policies.actors import scripted
+from tca_mj.agents.policies.gait import GaitPolicy
+from tca_mj.agents.scripts.course import CourseWalker
+from tca_mj.agents.scripts.tetrapod import WALK
+from tca_mj.agents.train.sb3_env import TaskVecEnv
 from tca_mj.envs.reach import BendReach
 from tca_mj.envs.tetrapod import TetrapodGait
 from tca_mj.modules.bending import BendingSpec

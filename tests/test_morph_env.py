@@ -11,7 +11,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from tca_mj.agents.morph import MorphPolicy
+from tca_mj.agents.scripts.morph import MorphPolicy
 from tca_mj.control.morph import Phase
 from tca_mj.envs.morph import ACTION, OBSERVATION, MorphModule
 from tca_mj.record.render import RenderingUnavailable

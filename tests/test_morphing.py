@@ -7,7 +7,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from tca_mj.agents.morph import MorphPolicy
+from tca_mj.agents.scripts.morph import MorphPolicy
 from tca_mj.control.morph import Measurement, Phase
 from tca_mj.modules.morphing import MorphingSpec, morphing_module
 from tca_mj.rod.beam import torsion_constant

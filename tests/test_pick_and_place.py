@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tca_mj.agents.scripted import PHASES, PickAndPlace
+from tca_mj.agents.scripts.arm import PHASES, PickAndPlace
 from tca_mj.envs.arm import OBJECTS, OBSERVATION, ArmPickPlace
 
 

@@ -9,11 +9,10 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
-from tca_mj.agents import policy as files
-from tca_mj.agents.actors import arguments_of
-from tca_mj.agents.network import Network
-from tca_mj.agents.policy import Origin, SavedPolicy, load_policy
-from tca_mj.agents.tetrapod_gaits import WALK, gait_policy
+from tca_mj.agents.policies import Origin, SavedPolicy, files, load_policy
+from tca_mj.agents.policies.actors import arguments_of
+from tca_mj.agents.policies.network import Network
+from tca_mj.agents.scripts.tetrapod import WALK, gait_policy
 from tca_mj.control import Gait
 from tca_mj.envs.tetrapod import ACTION, OBSERVATION
 from tca_mj.modules.continuum_leg import LegSpec
@@ -192,7 +191,7 @@ def test_impossible_networks_are_refused(change, message):
 def test_a_policy_loads_without_what_trained_it(tmp_path):
     path = POLICIES["residual"].save(tmp_path / "walk.npz")
     code = (
-        "import sys, gymnasium, tca_mj; from tca_mj.agents.policy import load_policy\n"
+        "import sys, gymnasium, tca_mj; from tca_mj.agents.policies import load_policy\n"
         f"env = gymnasium.make('{WALKING}', action='power')\n"
         f"p = load_policy({str(path)!r}, env); p.reset()\n"
         "p.act(env.reset(seed=0)[0])\n"

@@ -10,7 +10,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from tca_mj.agents.reach import ReachPolicy
+from tca_mj.agents.scripts.reach import ReachPolicy
 from tca_mj.control import Thermostat
 from tca_mj.envs.hanging import NoRest
 from tca_mj.envs.reach import ACTION, OBSERVATION, BendReach

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from tca_mj.agents.evaluate import METRICS, Evaluation, evaluate
-from tca_mj.agents.policy import SavedPolicy, shipped
+from tca_mj.agents.policies import SavedPolicy, shipped
 from tca_mj.registry import TASKS
 
 ROOT = Path(__file__).resolve().parent.parent

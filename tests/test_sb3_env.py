@@ -7,7 +7,7 @@ from stable_baselines3 import PPO
 from stable_baselines3.common.monitor import Monitor
 from stable_baselines3.common.vec_env import DummyVecEnv, VecMonitor, VecNormalize
 
-from tca_mj.agents.sb3_env import TaskVecEnv
+from tca_mj.agents.train.sb3_env import TaskVecEnv
 from tca_mj.registry import TASKS
 
 QUICK = "TCA/MorphModule-v0"

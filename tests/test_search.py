@@ -12,12 +12,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tca_mj.agents import search as searching
-from tca_mj.agents.gait_score import Headway, Reference, Trial, run_trial, score
-from tca_mj.agents.gait_space import PERIOD, GaitSpace
-from tca_mj.agents.policy import Origin, SavedPolicy
-from tca_mj.agents.search import TROT, SearchConfig, Trials, search
-from tca_mj.agents.tetrapod_gaits import GAITS, STEERING, WALK
+from tca_mj.agents.policies import Origin, SavedPolicy
+from tca_mj.agents.scripts.tetrapod import GAITS, STEERING, WALK
+from tca_mj.agents.train import search as searching
+from tca_mj.agents.train.gait_score import Headway, Reference, Trial, run_trial, score
+from tca_mj.agents.train.gait_space import PERIOD, GaitSpace
+from tca_mj.agents.train.runs import RunFolder
+from tca_mj.agents.train.search import TROT, SearchConfig, Trials, search
 from tca_mj.cli import main
 
 EVERY = GAITS | {"trot": replace(WALK, offset=TROT)}
@@ -164,7 +165,7 @@ def quiet(monkeypatch):
 
         flush = close = lambda self: None
 
-    monkeypatch.setattr("tca_mj.agents.runs.RunFolder.tensorboard", lambda self, step: Board())
+    monkeypatch.setattr(RunFolder, "tensorboard", lambda self, step: Board())
 
 
 @pytest.mark.usefixtures("quiet")
@@ -211,7 +212,7 @@ def test_a_search_finds_what_is_better(monkeypatch, tmp_path):
 SCRIPT = """
 import sys
 from pathlib import Path
-from tca_mj.agents.search import SearchConfig, search
+from tca_mj.agents.train.search import SearchConfig, search
 search(SearchConfig(**eval(sys.argv[1])), Path(sys.argv[2]), workers=2)
 """
 

@@ -15,7 +15,7 @@ from tca_mj.modules.bending import BendingSpec, bending_module
 from tca_mj.modules.finger import finger_pair
 from tca_mj.routes import Helix, leg_length
 from tca_mj.sim import Simulation, SimulationDiverged, SimulationOverheated
-from tca_mj.tca import CATALOGUE, FibreSpec, HeatStep
+from tca_mj.tca import CATALOGUE, FibreSpec, HeatStep, Supply, Thermostat
 
 
 def simulation(**options):
@@ -381,3 +381,25 @@ def test_strong_pulls_do_not_chatter():
     sim.data.qvel[sim.model.joint("body.twist6").dofadr[0]] = 1.0
     sim.step(power, 1.0)
     assert np.abs(sim.data.qvel).max() < 0.1
+
+
+def test_at_rest_nothing_moves_whatever_the_supply_takes():
+    sim = simulation()
+    heat = sim.bank.heat
+    thermostat = Thermostat(heat=heat, max_power=2.0)
+    sim.bank.supply = Supply(quantity="temperature", max_power=2.0, thermostat=thermostat)
+    told = sim.bank.supply
+    target = np.array([110.0, 25.0, 60.0])
+    assert sim.rest(target) < 1e-6
+    assert sim.bank.supply is told
+    assert sim.temperature == pytest.approx(target)
+    place = sim.data.site("tip").xpos.copy()
+    sim.bank.supply = Supply()
+    sim.step(sim.keep(target), 2.0)
+    assert np.linalg.norm(sim.data.site("tip").xpos - place) < 1e-6
+    assert sim.rest(target, warming=0.0, longest=0.1, quiet=0.0) < 1e-5
+
+
+def test_what_cannot_be_kept_is_no_rest():
+    with pytest.raises(ValueError, match="temperature must be finite and at least"):
+        simulation().rest([20.0, 25.0, 25.0], warming=0.0)

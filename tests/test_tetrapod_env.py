@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from tca_mj.agents.tetrapod_gaits import GAITS, gait_policy
+from tca_mj.agents.scripts.tetrapod import GAITS, gait_policy
 from tca_mj.envs.options import variation_of
 from tca_mj.envs.stance import CAMERAS
 from tca_mj.envs.tetrapod import ACTION, OBSERVATION, TASKS, TetrapodGait

@@ -14,14 +14,16 @@ import pytest
 import torch
 from stable_baselines3.common.vec_env import VecNormalize
 
-from tca_mj.agents import config as settings
-from tca_mj.agents.config import OffPolicy, OnPolicy, TrainConfig, default_config
-from tca_mj.agents.export import exported
-from tca_mj.agents.learning_env import LearningEnv
-from tca_mj.agents.policy import ResidualPolicy, SavedPolicy, load_policy
-from tca_mj.agents.sb3_env import TaskVecEnv
-from tca_mj.agents.tetrapod_gaits import GAITS, STEERING, gait_policy
-from tca_mj.agents.train import Run, RunFolder, _learner, train
+from tca_mj.agents.policies import SavedPolicy, load_policy
+from tca_mj.agents.policies.files import ResidualPolicy
+from tca_mj.agents.scripts.tetrapod import GAITS, STEERING, gait_policy
+from tca_mj.agents.train import config as settings
+from tca_mj.agents.train.config import OffPolicy, OnPolicy, TrainConfig, default_config
+from tca_mj.agents.train.deep import Run, _learner, train
+from tca_mj.agents.train.export import exported
+from tca_mj.agents.train.learning_env import LearningEnv
+from tca_mj.agents.train.runs import RunFolder
+from tca_mj.agents.train.sb3_env import TaskVecEnv
 from tca_mj.cli import main
 from tca_mj.registry import TASKS
 
@@ -61,7 +63,7 @@ def quiet(monkeypatch):
 
         flush = close = lambda self: None
 
-    monkeypatch.setattr("tca_mj.agents.runs.RunFolder.tensorboard", lambda self, step: Board())
+    monkeypatch.setattr(RunFolder, "tensorboard", lambda self, step: Board())
     monkeypatch.setattr(Run, "record", lambda self, video: None)
 
 
@@ -102,8 +104,8 @@ def test_a_run_that_is_broken_off_ends_as_one_that_is_not(algorithm, tmp_path, m
 SCRIPT = """
 import sys
 from pathlib import Path
-from tca_mj.agents.config import OnPolicy, TrainConfig
-from tca_mj.agents.train import train
+from tca_mj.agents.train.config import OnPolicy, TrainConfig
+from tca_mj.agents.train.deep import train
 train(TrainConfig(learner=OnPolicy(**eval(sys.argv[2])), **eval(sys.argv[1])), Path(sys.argv[3]))
 """
 
@@ -247,7 +249,7 @@ def test_impossible_learners_are_refused(kind, change, message):
 def test_the_command_makes_the_settings(monkeypatch, tmp_path):
     asked = []
     monkeypatch.setattr(
-        "tca_mj.agents.train.train",
+        "tca_mj.agents.train.deep.train",
         lambda config, out, *, command, video: asked.append((config, out, command, video)),
     )
     out = ["--out", str(tmp_path), "--no-video"]

@@ -19,8 +19,8 @@ import numpy as np
 from gymnasium import Wrapper
 from tqdm import tqdm
 
-from tca_mj.agents.actors import arguments_of, scripted
-from tca_mj.agents.policy import Policy
+from tca_mj.agents.policies import Policy
+from tca_mj.agents.policies.actors import arguments_of, scripted
 from tca_mj.bench.clock import Replay, Stopwatch, in_physics, median, taken
 from tca_mj.checks import Array, number
 from tca_mj.envs.wrappers import RecordRerun

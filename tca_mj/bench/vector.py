@@ -210,7 +210,7 @@ def _training(id: str, frames: int, n: int) -> dict[str, float]:
     from stable_baselines3 import PPO
     from stable_baselines3.common.vec_env import DummyVecEnv, VecEnv
 
-    from tca_mj.agents.sb3_env import TaskVecEnv
+    from tca_mj.agents.train.sb3_env import TaskVecEnv
 
     def one_by_one(id: str) -> VecEnv:
         return DummyVecEnv([lambda: gym.make(id)] * n)

@@ -122,13 +122,7 @@ def run(
     sim = Simulation(part) if timestep is None else Simulation(part, timestep=timestep)
     hands = [sim.model.body(_hand(tip)).id for tip in tips]
     sim.data.xfrc_applied[hands] = np.hstack([load.force, load.moment])
-    ambient = 25.0
-    for time in np.arange(0.1, _LONGEST, 0.1):
-        now = ambient + min(time / _HEATING, 1.0) * (temperature - ambient)
-        sim.step(sim.keep(now), 0.1)
-        left = float(np.abs(sim.data.qvel).max())
-        if time > _HEATING and left < _QUIET:
-            break
+    left = sim.rest(temperature, warming=_HEATING, longest=_LONGEST, quiet=_QUIET)
     mujoco.mj_forward(sim.model, sim.data)
     return Rest(*_place(sim.data, hands), sim.length, np.maximum(sim.tension - 1e-9, 0.0)), left
 

@@ -97,8 +97,8 @@ def _train(arguments: argparse.Namespace) -> int:
              depends.
       ppo, sac, td3
              deep reinforcement learning by Stable-Baselines3, for every task. The defaults of each
-             task are in tca_mj.agents.config. With --residual K the policy of a gait task corrects
-             the temperatures of the gait --start by at most K kelvin.
+             task are in tca_mj.agents.train.config. With --residual K the policy of a gait task
+             corrects the temperatures of the gait --start by at most K kelvin.
 
     The folder holds
       run.json        settings, command, versions, machine
@@ -117,9 +117,9 @@ def _train(arguments: argparse.Namespace) -> int:
       tca-mj train TASK --algo cma --start trot --seeds 3 --out runs/trot
       tca-mj train TASK --algo ppo --residual 20 --steps 300000 --out runs/corrected
     """
-    import tca_mj.agents.search as searching
-    import tca_mj.agents.train as training
-    from tca_mj.agents.config import default_config
+    import tca_mj.agents.train.deep as training
+    import tca_mj.agents.train.search as searching
+    from tca_mj.agents.train.config import default_config
 
     base = arguments.out or Path("runs/train") / f"{task_name(arguments.task)}-{arguments.algo}"
     several = range(arguments.seeds) if arguments.seeds else None

@@ -103,7 +103,7 @@ def speed_table(summary: dict[str, Any]) -> str:
 
 
 def _list(arguments: argparse.Namespace) -> int:
-    from tca_mj.agents.policy import SavedPolicy, shipped
+    from tca_mj.agents.policies import SavedPolicy, shipped
 
     policies = {name: SavedPolicy.read(path) for name, path in shipped().items()}
     demos = {task: name for name, task in DEMOS.items()}
@@ -143,7 +143,7 @@ def _view(arguments: argparse.Namespace) -> int:
     except NoDisplay as error:
         print(_NO_DISPLAY.format(reason=error, task=arguments.task), file=sys.stderr)
         return 2
-    from tca_mj.agents.actors import arguments_of
+    from tca_mj.agents.policies.actors import arguments_of
 
     env = make(arguments.task, **arguments_of(arguments.policy, arguments.task))
     policy = _policy(arguments.policy, env, arguments.seed)
@@ -155,7 +155,7 @@ def _view(arguments: argparse.Namespace) -> int:
 
 def _policy(name: str, env: Any, seed: int) -> Any:
     """A policy for the viewer."""
-    from tca_mj.agents.actors import actor
+    from tca_mj.agents.policies.actors import actor
     from tca_mj.envs.viewer import ViewerPolicy
 
     found = actor(name, env, seed=seed)

@@ -14,7 +14,7 @@ from types import MappingProxyType
 import mujoco
 import numpy as np
 
-from tca_mj.agents.scripted import PickAndPlace
+from tca_mj.agents.scripts.arm import PickAndPlace
 from tca_mj.checks import Array
 from tca_mj.envs.arm import ArmPickPlace
 from tca_mj.robots.arm import ArmSpec, arm

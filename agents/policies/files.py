@@ -23,8 +23,8 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from tca_mj.agents.gait_policy import GaitPolicy
-from tca_mj.agents.network import Network
+from tca_mj.agents.policies.gait import GaitPolicy
+from tca_mj.agents.policies.network import Network
 from tca_mj.control import Gait
 from tca_mj.envs.task import HEATINGS
 from tca_mj.files import write_whole
@@ -300,7 +300,7 @@ def find(source: str | Path) -> Path:
 
 def shipped() -> dict[str, Path]:
     """The files of the policies that come with the package, by name."""
-    folder = Path(str(files("tca_mj.agents"))) / "policies"
+    folder = Path(str(files("tca_mj.agents.policies")))
     found = sorted(folder.glob("*")) if folder.is_dir() else []
     return {path.stem: path for path in found if path.suffix in KINDS.values()}
 

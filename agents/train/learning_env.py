@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from stable_baselines3.common.vec_env import VecEnvWrapper
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvStepReturn
 
-from tca_mj.agents.gait_policy import GaitPolicy
-from tca_mj.agents.policy import with_clock
-from tca_mj.agents.sb3_env import TaskVecEnv
+from tca_mj.agents.policies.files import with_clock
+from tca_mj.agents.policies.gait import GaitPolicy
+from tca_mj.agents.train.sb3_env import TaskVecEnv
 from tca_mj.control import Gait
 
 Observations = NDArray[np.float32]
@@ -24,7 +24,7 @@ class LearningEnv(VecEnvWrapper):
 
     With ``gait`` an action is a correction of the temperatures of a gait, 1 being ``bound``, and
     an observation ends with sine and cosine of the gait's phase: what is learned is the network of
-    a ``tca_mj.agents.policy.ResidualPolicy``.
+    a ``tca_mj.agents.policies.files.ResidualPolicy``.
 
     Attributes:
         finished: For every episode that ended since it was last emptied: ``return``, ``length``,

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tca_mj.agents.policy import Policy, SavedPolicy, find, load_policy, require_arguments
+from tca_mj.agents.policies import Policy, SavedPolicy, find, load_policy, require_arguments
 from tca_mj.registry import task_class
 
 NAMES = ("scripted", "off", "random")

@@ -8,7 +8,7 @@ from stable_baselines3 import PPO, SAC, TD3
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.vec_env import VecNormalize
 
-from tca_mj.agents.network import Network
+from tca_mj.agents.policies.network import Network
 
 
 def exported(model: BaseAlgorithm, normalise: VecNormalize) -> Network:

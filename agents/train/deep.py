@@ -25,14 +25,14 @@ from stable_baselines3.common.noise import NormalActionNoise
 from stable_baselines3.common.vec_env import VecNormalize
 from tqdm import tqdm
 
-from tca_mj.agents.config import OnPolicy, TrainConfig
-from tca_mj.agents.export import exported
-from tca_mj.agents.learning_env import LearningEnv
-from tca_mj.agents.policy import Origin, Policy, SavedPolicy
+from tca_mj.agents.policies import Origin, Policy, SavedPolicy
 from tca_mj.agents.rollout import rollout
-from tca_mj.agents.runs import CURVE, LIBRARIES, RunFolder
-from tca_mj.agents.sb3_env import TaskVecEnv
-from tca_mj.agents.search import first_gait
+from tca_mj.agents.train.config import OnPolicy, TrainConfig
+from tca_mj.agents.train.export import exported
+from tca_mj.agents.train.learning_env import LearningEnv
+from tca_mj.agents.train.runs import CURVE, LIBRARIES, RunFolder
+from tca_mj.agents.train.sb3_env import TaskVecEnv
+from tca_mj.agents.train.search import first_gait
 from tca_mj.envs.wrappers import RecordRerun
 from tca_mj.machine import versions
 from tca_mj.record.film import Film

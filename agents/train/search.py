@@ -21,12 +21,12 @@ from cmaes import CMA
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from tca_mj.agents.actors import arguments_of, scripted
-from tca_mj.agents.gait_policy import GaitPolicy
-from tca_mj.agents.gait_score import Headway, Reference, Trial, run_trial, score
-from tca_mj.agents.gait_space import GaitSpace
-from tca_mj.agents.policy import Origin, SavedPolicy, find
-from tca_mj.agents.runs import CURVE, LIBRARIES, RunFolder
+from tca_mj.agents.policies import Origin, SavedPolicy, find
+from tca_mj.agents.policies.actors import arguments_of, scripted
+from tca_mj.agents.policies.gait import GaitPolicy
+from tca_mj.agents.train.gait_score import Headway, Reference, Trial, run_trial, score
+from tca_mj.agents.train.gait_space import GaitSpace
+from tca_mj.agents.train.runs import CURVE, LIBRARIES, RunFolder
 from tca_mj.checks import require_count
 from tca_mj.control import Gait
 from tca_mj.machine import versions

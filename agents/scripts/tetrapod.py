@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from tca_mj.agents.gait_policy import GaitPolicy
+from tca_mj.agents.policies.gait import GaitPolicy
 from tca_mj.control import Gait
 from tca_mj.envs.stance import LEG_TCAS
 from tca_mj.envs.tetrapod import OBSERVATION, TetrapodGait

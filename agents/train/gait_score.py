@@ -9,7 +9,7 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 
-from tca_mj.agents.gait_policy import GaitPolicy
+from tca_mj.agents.policies.gait import GaitPolicy
 from tca_mj.agents.rollout import rollout
 from tca_mj.control import Gait
 

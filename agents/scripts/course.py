@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from tca_mj.agents.tetrapod_gaits import CRAWL, SHIMMY, WALK
+from tca_mj.agents.scripts.tetrapod import CRAWL, SHIMMY, WALK
 from tca_mj.control import Gait, Thermostat
 from tca_mj.envs.course import OBSERVATION, Places, TetrapodCourse
 from tca_mj.robots.tetrapod import SPINES

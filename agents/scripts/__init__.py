@@ -1,0 +1,1 @@
+"""Scripted policies of the tasks: feedback on what is seen, no replay."""

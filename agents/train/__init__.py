@@ -1,0 +1,1 @@
+"""What makes policies: ``search`` over the figures of a gait, ``deep`` reinforcement learning."""
