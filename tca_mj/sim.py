@@ -195,7 +195,7 @@ class Simulation:
 
     def rest(
         self, temperature: ArrayLike, *, warming: float = 1.0, longest: float = 20.0,
-        quiet: float = 1e-6,
+        quiet: float = 3e-5,
     ) -> float:  # fmt: skip
         """Warms the TCAs and waits until nothing moves any more: an equilibrium as a user finds it.
 
