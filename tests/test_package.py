@@ -7,6 +7,7 @@ import subprocess
 import sys
 import tomllib
 import zipfile
+from importlib import import_module
 from pathlib import Path
 
 import gymnasium as gym
@@ -73,6 +74,34 @@ def test_importing_the_package_loads_nothing_heavy(tmp_path):
         tmp_path,
     )
     assert loaded == "[]"
+
+
+def test_the_door_offers_what_is_typed_most():
+    """Lazily: each noun is what stands in the module that it comes from."""
+    assert set(tca_mj._NOUNS) <= set(dir(tca_mj))
+    for name, module in tca_mj._NOUNS.items():
+        assert getattr(tca_mj, name) is getattr(import_module(f"tca_mj.{module}"), name)
+    with pytest.raises(AttributeError, match="no attribute 'nothing'"):
+        tca_mj.nothing  # noqa: B018
+
+
+@pytest.mark.parametrize("module", ["tca_mj.tca", "tca_mj.rod", "tca_mj.smp", "tca_mj.control"])
+def test_the_physics_needs_numpy_and_scipy_alone(tmp_path, module):
+    hidden = ["gymnasium", "mujoco", "dm_control", "rerun", "torch", "stable_baselines3"]
+    code = f"""
+import sys
+class Hidden:
+    def find_spec(self, name, path=None, target=None):
+        if name.partition(".")[0] in {hidden}:
+            raise ModuleNotFoundError(f"No module named {{name!r}}", name=name)
+sys.meta_path.insert(0, Hidden())
+import {module}
+if {module!r} == "tca_mj.tca":
+    bank = {module}.TcaBank([{module}.CATALOGUE["free-stroke"]])
+    print(bank.pull(bank.rest(), bank.rest_length).tension.shape)
+print("done")
+"""
+    assert run_python(code, tmp_path).splitlines()[-1] == "done"
 
 
 def test_gymnasium_finds_the_tasks_by_the_name_of_the_package(tmp_path):

@@ -1,7 +1,6 @@
 """Rod, Love and Castigliano side by side, and the cone: the facts of Chapter 3."""
 
 import time
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cache
 from typing import NamedTuple
@@ -142,27 +141,25 @@ def crept_free_stroke(grams: float) -> TcaSpec:
     return settled(FREE_STROKE_CREPT["0 g"], grams)
 
 
-def lifting(grams: float, law: Theory, source: str = "fibre") -> LoadedTcas:
+def lifting(
+    grams: float, theory: Theory, source: str = "fibre", load: Load | None = None
+) -> LoadedTcas:
     """The free-stroke TCA, crept under a weight, that lifts it.
 
     Args:
         grams: The weight.
-        law: The model of its tension.
+        theory: The model of its tension.
         source: Whether 6.7 ohm/dm are counted per length of "fibre" or of "tca".
+        load: What it lifts instead.
     """
     tca = crept_free_stroke(grams)
     per_length = 67.0 * (tca.fibre_length / tca.rest_length if source == "fibre" else 1.0)
     tca = replace(tca, resistance_per_length=per_length)
-    return LoadedTcas([tca], Load.weight(1e-3 * grams), law=law_of(tca, law))
-
-
-def law_of(tca: TcaSpec, theory: Theory) -> Callable[[Array, Array], tuple[Array, Array]]:
-    """Tension law of one TCA for ``LoadedTcas``."""
 
     def law(length: Array, temperature: Array) -> tuple[Array, Array]:
         return tension(tca, length, temperature, **theory.settings)  # type: ignore[arg-type]
 
-    return law
+    return LoadedTcas([tca], load or Load.weight(1e-3 * grams), law=law)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -172,12 +169,20 @@ class Lift:
     Attributes:
         time: Time [s].
         temperature: Temperature in the rod model [°C].
-        displacement: By name of the model [mm].
+        displacement: By name of the model, the rod first [mm].
     """
 
     time: Array
     temperature: Array
     displacement: dict[str, Array]
+
+    @property
+    def distances(self) -> dict[str, float]:
+        """Largest distance from the rod up to 160 °C over its displacement, of the others [1]."""
+        known = self.temperature <= 160.0
+        rod, *others = (moved[known] for moved in self.displacement.values())
+        return {name: float(np.abs(moved - rod).max() / rod.max())
+                for name, moved in zip([*self.displacement][1:], others, strict=True)}  # fmt: skip
 
 
 @cache
@@ -197,12 +202,8 @@ def lifts(*, dt: float) -> dict[tuple[float, int], Lift]:
 
 def dynamics(dt: float = 0.01) -> list[Finding]:
     """Distances of Love and Castigliano from the rod while a voltage heats the TCA."""
-    found, errors = lifts(dt=dt), {}
-    for case, lift in found.items():
-        known = lift.temperature <= 160.0
-        rod = lift.displacement[ROD.name][known]
-        errors[case] = [float(np.abs(lift.displacement[t.name][known] - rod).max() / rod.max())
-                        for t in (CST, LOVE)]  # fmt: skip
+    found = lifts(dt=dt)
+    errors = {case: lift.distances.values() for case, lift in found.items()}
     shown = "; ".join(f"{volts:g} V {grams} g {100 * cst:.0f}, {100 * love:.0f}"
                       for (volts, grams), (cst, love) in errors.items())  # fmt: skip
     hottest = max(float(lift.temperature[-1]) for lift in found.values())
