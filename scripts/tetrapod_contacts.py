@@ -6,8 +6,9 @@ Distances are those of 60 s from seed 0 over the one with everything as in the t
 with a time constant of 1 ms at a step of 0.5 ms, whose layer at the surface is an eighth of the
 task's, 25 um, or which have none. Contacts, halved and doubled: every number of them, none of which
 says anything of the robot. Half the step; TCAs handed over in every physics step. Deepest: in any
-physics step of 60 s, from when the robot has been put down. Slide: the largest way of a foot while the robot stands for 20 s. Time:
-processor time of ``env.step``, the fastest of three runs of 20 s; over its physics steps.
+physics step of 60 s, from when the robot has been put down. Slide: the largest way of a foot while
+the robot stands for 20 s. Time: processor time of ``env.step``, the fastest of three runs of 20 s;
+over its physics steps.
 
 The last table is about hard contacts: the searched walk, 20 s, at shorter and shorter steps. Lost:
 how often in a second a foot loses its contact. Dragged: mean speed of a foot while it carries, over

@@ -38,6 +38,7 @@ LAYER_OF = {
     "state": "sim",
     "couple": "sim",
     "actuation": "control",
+    "exported": "sim",
     "testing": "agents",
 }
 # The lowest layer that may import a third-party package.

@@ -1,0 +1,73 @@
+"""A built part as one MJCF file for plain MuJoCo: its TCAs pull as they do at given temperatures.
+
+In a simulation the TCAs' law is handed to MuJoCo anew every few milliseconds, and so are the
+springs that make polylines stand for smooth curves (``tca_mj.model.smooth``). The file holds both
+as they are at rest at these temperatures, linear in the tendons' lengths; at that rest they are
+exact, and about it they are as good as a tangent. Heat, and what it changes, is none of it.
+"""
+
+from pathlib import Path
+
+import mujoco
+import numpy as np
+from numpy.typing import ArrayLike
+
+from tca_mj.files import write_whole
+from tca_mj.model.part import Part
+from tca_mj.sim import Simulation
+
+REST = "rest"  # the keyframe of the rest that was found
+
+
+def export(
+    part: Part, path: str | Path | None = None, *, temperatures: ArrayLike | None = None
+) -> str:
+    """Writes a part as MJCF whose TCAs pull with their law frozen at temperatures.
+
+    The part is led to rest at them, from its unloaded shape. The file has that rest as the keyframe
+    ``rest``; from any other place near it MuJoCo comes there by itself.
+
+    Args:
+        part: What is exported; it stays as it is.
+        path: The file; None to return the text only.
+        temperatures: Temperatures of the n TCAs, shape (n,), or one for all; None for those of the
+            surroundings [°C].
+
+    Returns:
+        The text of the file.
+
+    Raises:
+        ValueError: If the temperatures have the wrong shape or are below the surroundings'.
+        SimulationDiverged: If there is no rest at them.
+    """
+    own = Part(part.spec.copy(), part.tcas, dict(part.sites), part.spines)
+    sim = Simulation(own)
+    ambient = np.broadcast_to(sim.bank.heat.ambient, sim.n)
+    asked = ambient if temperatures is None else np.asarray(temperatures, dtype=np.float64)
+    sim.rest(np.broadcast_to(asked, (sim.n,)) if asked.ndim == 0 else asked)
+    return frozen(sim, own.spec, path)
+
+
+def frozen(sim: Simulation, spec: mujoco.MjSpec, path: str | Path | None = None) -> str:
+    """``export`` of a simulation as it is now.
+
+    Args:
+        sim: The simulation.
+        spec: What it was compiled from; the law and the springs are written to it.
+        path: The file; None to return the text only.
+    """
+    model = sim.model
+    for joint in spec.joints:
+        number = joint.id
+        if model.jnt_type[number] < int(mujoco.mjtJoint.mjJNT_SLIDE):
+            continue  # free or a ball
+        joint.stiffness[0] = model.jnt_stiffness[number]
+        joint.springref = model.qpos_spring[model.jnt_qposadr[number]]
+        joint.damping[0] = model.dof_damping[model.jnt_dofadr[number]]
+    for name, number in zip(sim.tca_names, sim.actuator, strict=True):
+        spec.actuator(name).biasprm = model.actuator_biasprm[number]
+    spec.add_key(name=REST, qpos=sim.data.qpos)
+    text: str = spec.to_xml()
+    if path is not None:
+        write_whole(Path(path), text.encode())
+    return text
