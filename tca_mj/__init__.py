@@ -29,7 +29,7 @@ _NOUNS = {
     "CATALOGUE": "tca", "Supply": "tca", "TcaBank": "tca", "TcaSpec": "tca", "Thermostat": "tca",
     "BeamSpec": "rod", "Outline": "rod", "Helix": "routes", "UTurn": "routes", "parallel": "routes",
     "Part": "model.part", "new_spec": "model.part", "add_chain": "model.chain",
-    "lay_tca": "model.tendon", "route_passes": "model.tendon", "scene": "model.scene",
+    "add_tca": "model.build", "stage": "model.build", "scene": "model.scene",
     "Simulation": "sim", "Drive": "sim", "export": "exported", "Recorder": "record",
     "Film": "record.film",
     "BendingSpec": "modules.bending", "bending_module": "modules.bending",

@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from tca_mj.actuation import Group, MixedBank, Signal, muscle_group
 from tca_mj.couple import Inputs, Writes, advance, measure, write
+from tca_mj.model.build import stage
 from tca_mj.model.part import Part
 from tca_mj.model.smooth import SmoothBody
 from tca_mj.model.spines import Spines
@@ -102,6 +103,8 @@ class Simulation:
     ) -> None:
         """Compiles ``part``; its specification can still be changed and compiled again.
 
+        A part without a light gets ``tca_mj.model.build.stage``.
+
         Args:
             part: What to simulate.
             timestep: Physics time step [s].
@@ -124,6 +127,8 @@ class Simulation:
                 f"tca_period must be a positive multiple of timestep {timestep} s, got {tca_period}"
             )
         part.spec.option.timestep = timestep
+        if not part.spec.lights:  # of no influence but on pictures, which would be black
+            stage(part)
         self.model: mujoco.MjModel = part.spec.compile()
         self.data = mujoco.MjData(self.model)
         self.tca_period = tca_period

@@ -1,0 +1,85 @@
+"""What a robot of one's own is built with: TCAs laid into chains, and a stage to look at it on."""
+
+import difflib
+
+import mujoco
+
+from tca_mj.model.chain import Chain
+from tca_mj.model.part import Part
+from tca_mj.model.tendon import RoutedTca, lay_tca, route_passes
+from tca_mj.routes import Route
+from tca_mj.tca import CATALOGUE, TcaSpec
+
+VIEW = "view"  # the camera of a stage
+
+
+def add_tca(
+    part: Part,
+    chain: Chain,
+    route: Route,
+    tca: TcaSpec | str,
+    *,
+    name: str | None = None,
+) -> RoutedTca:
+    """Lays a TCA along a route through a chain, cut to the route's length, and adds it to the part.
+
+    Args:
+        part: The part, in whose specification the chain was built.
+        chain: The chain, as ``add_chain`` returns it.
+        route: Where it runs: ``Helix`` (with 0 turns a straight line), ``UTurn``, or one of
+            ``parallel(...)``.
+        tca: The kind of TCA, or its name in ``CATALOGUE``; its own length does not matter.
+        name: Its name; by default ``tca0``, ``tca1`` and so on.
+
+    Returns:
+        The routed TCA, which is the last of ``part.tcas`` now.
+
+    Raises:
+        ValueError: If the kind is unknown, the route no route or out of the body, or the name
+            taken.
+    """
+    if isinstance(tca, str):
+        if tca not in CATALOGUE:
+            near = difflib.get_close_matches(tca, CATALOGUE, 1, 0.0)
+            raise ValueError(
+                f"tca must be a TcaSpec or one of {sorted(CATALOGUE)}, got {tca!r}; did you mean"
+                f" {near[0]!r}?"
+            )
+        tca = CATALOGUE[tca]
+    if not hasattr(route, "legs"):
+        hint = "; parallel(...) gives several routes, one for each TCA" if route else ""
+        raise ValueError(f"route must be a Helix or a UTurn, got {route!r}{hint}")
+    name = f"tca{len(part.tcas)}" if name is None else name
+    if name in [other.name for other in part.tcas]:
+        raise ValueError(f"name must be new in this part, got {name!r} again")
+    laid = lay_tca(part.spec, tca, route_passes(chain, route), name=name)
+    part.tcas = (*part.tcas, laid)
+    return laid
+
+
+def stage(part: Part, *, floor: float | None = None) -> None:
+    """Gives a bare part a sky, a light and the camera ``view``; a simulation does it by itself.
+
+    Args:
+        part: The part, which has no light of its own.
+        floor: Height of a floor, which carries what falls on it; None for none [m].
+    """
+    spec = part.spec
+    spec.add_texture(
+        name="stage.sky", type=mujoco.mjtTexture.mjTEXTURE_SKYBOX,
+        builtin=mujoco.mjtBuiltin.mjBUILTIN_GRADIENT, width=128, height=128,
+        rgb1=[0.93, 0.95, 0.98], rgb2=[0.72, 0.78, 0.86],
+    )  # fmt: skip
+    spec.worldbody.add_light(
+        name="stage.light", pos=[0.3, -0.6, 1.2], dir=[-0.2, 0.4, -0.8], diffuse=[0.5, 0.5, 0.5]
+    )
+    spec.visual.headlight.ambient = [0.35, 0.35, 0.35]
+    spec.visual.headlight.diffuse = [0.4, 0.4, 0.4]
+    spec.worldbody.add_camera(
+        name=VIEW, pos=[0.0, -0.3, 0.06], xyaxes=[1.0, 0.0, 0.0, 0.0, 0.2, 1.0], fovy=35.0
+    )
+    if floor is not None:
+        spec.worldbody.add_geom(
+            name="stage.floor", type=mujoco.mjtGeom.mjGEOM_PLANE, size=[1.0, 1.0, 0.01],
+            pos=[0.0, 0.0, floor], rgba=[0.8, 0.81, 0.83, 1.0], friction=[0.8, 0.002, 1e-4],
+        )  # fmt: skip
