@@ -7,10 +7,10 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 
-from tca_mj.agents.episode import RECORDING, Episode
+from tca_mj.agents.episode import PLOT, RECORDING, VIDEO, Episode
 from tca_mj.agents.policies import Policy
 from tca_mj.agents.policies.actors import actor, arguments_of
-from tca_mj.envs.wrappers import RecordRerun
+from tca_mj.checks import require_positive
 from tca_mj.registry import make
 
 
@@ -68,36 +68,19 @@ def play(
         ValueError: If it is for another task, or an argument cannot be used.
         KeyboardInterrupt: As it came, after everything was written.
     """
-    if max_duration is not None and not max_duration > 0.0:
-        raise ValueError(f"max_duration must be above 0 s, got {max_duration}")
-    if speed is not None and not (np.isfinite(speed) and speed > 0.0):
-        raise ValueError(f"speed must be finite and above 0, got {speed}")
+    if max_duration is not None:
+        require_positive(max_duration=max_duration)
+    if speed is not None:
+        require_positive(speed=speed)
     named = isinstance(policy, str | Path)
     needed = arguments_of(str(policy), task) if named and arguments is None else arguments or {}
     env: gym.Env[Any, Any] = make(task, **needed)
-    told: Any = env.unwrapped
-    limit = max_duration or np.inf
-    if env.spec is not None and env.spec.max_episode_steps is not None:
-        limit = min(limit, env.spec.max_episode_steps * told.control_period)
-    acting: Any = policy
-    name = type(policy).__name__
-    if isinstance(policy, str | Path):
-        acting, name = actor(policy, env, seed=seed), str(policy)  # before a file is touched
-        acting.reset()
+    # Before a file is touched.
+    acting = actor(policy, env, seed=seed) if isinstance(policy, str | Path) else policy
+    name = str(policy) if named else type(policy).__name__
+    files = (RECORDING, VIDEO, PLOT) if video else (RECORDING, PLOT)
     episode = Episode(
-        env if out is None else RecordRerun(env, out / RECORDING), acting, seed=seed, out=out,
-        options=options, title=f"{name} in {task}",
-    )  # fmt: skip
-
-    def summary() -> dict[str, Any]:
-        spines = told.sim.spines
-        found = {
-            "task": task, "policy": name, **episode.summary(),
-            "heater_energy": dict(zip(spines.names, spines.energy.tolist(), strict=True)),
-            **told.outcome(),
-        }  # fmt: skip
-        return found | ({"tries": acting.tries} if hasattr(acting, "tries") else {})
-
-    return episode.run(
-        limit, speed=speed or told.film_speed, video=video, progress=progress, summary=summary
+        env, acting, names=(task, name), seed=seed, out=out, options=options, files=files
     )
+    limit = min(max_duration or np.inf, episode.limit)
+    return episode.run(limit, speed=speed or episode.task.film_speed, progress=progress)

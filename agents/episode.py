@@ -1,9 +1,8 @@
 """An episode under way: what is seen of it, filmed, recorded and summed up, however it ends."""
 
-import json
 import time
 from collections import defaultdict
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
@@ -13,10 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
+from tca_mj.agents.output import write_json
 from tca_mj.agents.policies import Policy
-from tca_mj.envs.task import Headway, how_it_ended
+from tca_mj.agents.rollout import Step, rollout
+from tca_mj.envs.task import Headway
 from tca_mj.envs.wrappers import RecordRerun
-from tca_mj.files import write_whole
 from tca_mj.machine import machine, versions
 from tca_mj.record.film import Film
 from tca_mj.record.plots import rollout_plot
@@ -36,117 +36,131 @@ class Episode:
         env: gym.Env[Any, Any],
         policy: Policy,
         *,
+        names: tuple[str, str],
         seed: int,
         out: Path | None,
         options: Mapping[str, Any] | None = None,
-        title: str = "",
+        files: Sequence[str] = (RECORDING, VIDEO, PLOT),
     ) -> None:
-        """Resets the environment; only then are the files in ``out`` touched.
+        """Resets policy and environment; only then are the files in ``out`` touched.
 
         Args:
-            env: The task, wrapped in ``RecordRerun`` if there is to be a recording.
+            env: The task.
             policy: Who acts.
+            names: What task and policy are called.
             seed: Seed of the episode.
             out: Folder for the files; None to write nothing.
             options: Options of the reset.
-            title: What the plot is called, before how it ended.
+            files: What is written besides ``SUMMARY``; ``RECORDING`` always is.
         """
-        self.env, self.policy, self.seed, self.out = env, policy, seed, out
         task: Any = env.unwrapped
-        self.task, self.sim = task, task.sim
+        self.task, self.sim, self.policy = task, task.sim, policy
+        self.names, self.seed, self.out, self.files = names, seed, out, files
+        steps = None if env.spec is None else env.spec.max_episode_steps
+        self.limit = np.inf if steps is None else steps * task.control_period  # [s]
+        self.recording = None if out is None else RecordRerun(env, out / RECORDING)
+        self.env = self.recording or env
         self.ending = ""
-        self.success = False
         self.total = 0.0  # of the rewards
         self.held_until = ""  # phase in which an object was last touched
         self.wall: dict[str, float] = defaultdict(float)
         self.left_out: dict[str, str] = {}
         self._film: Film | None = None
-        self._title = title
-        self.observation, self.info = env.reset(seed=seed, options=dict(options or {}))
         self.clock: list[float] = []
         self.places: list[Headway | None] = []
         self.samples: dict[str, list[Any]] = defaultdict(list)
-        self.phases: list[tuple[float, str]] = [(0.0, policy.phase)]
-        self._event(policy.phase)
-        self._sample()
+        self.phases: list[tuple[float, str]] = []
+        self._steps = rollout(
+            self.env, policy, seed=seed, options=options, decided=self._note_phase
+        )
+        self.last = next(self._steps)
+        self._note_phase()
+        self._see(self.last)
 
-    def run(
-        self,
-        limit: float,
-        *,
-        speed: float,
-        video: bool,
-        progress: bool,
-        summary: Callable[[], dict[str, Any]],
-    ) -> dict[str, Any]:
+    def run(self, limit: float, *, speed: float, progress: bool) -> dict[str, Any]:
         """Goes on to the end, and writes what happened.
 
         Args:
             limit: Simulated time after which to stop [s].
             speed: Simulated seconds per second of film.
-            video: Whether to make the film.
             progress: Whether to show a progress bar, where there is a terminal.
-            summary: What is to be written of the episode.
 
         Returns:
-            The summary.
+            The summary, see ``tca_mj.agents.demo.play``.
         """
-        if self.out is not None:
-            for name in (VIDEO, PLOT):
-                (self.out / name).unlink(missing_ok=True)
-            self._write(summary)
         # What is called back at the end, the last first, whatever happens to the others.
         with ExitStack() as ends:
             if self.out is not None:
-                ends.callback(self._write, summary)
-                ends.callback(self._plot)
+                for name in (VIDEO, PLOT):
+                    (self.out / name).unlink(missing_ok=True)
+                self._write(self.out)
+                ends.callback(self._write, self.out)
+                if PLOT in self.files:
+                    ends.callback(self._plot, self.out / PLOT)
             ends.callback(self.env.close)
             ends.callback(self._end_film)
             bar = tqdm(total=limit, bar_format=_BAR, disable=None if progress else True)
             ends.callback(bar.close)
-            with self._named_errors():
-                if video:
-                    self._begin_film(speed)
+            try:
+                if VIDEO in self.files and self.out is not None:
+                    path, camera = self.out / VIDEO, self.task.camera
+                    with self._attempt("video", VIDEO):
+                        film = Film(self.sim, path, fps=_FPS, speed=speed, camera=camera)
+                        film.frame()
+                        self._film = film
                 while not self.ending:
-                    self.step()
+                    self._go_on()
                     bar.set_description_str(self.policy.phase, refresh=False)
                     bar.update(self.clock[-1] - bar.n)
                     if not self.ending and self.clock[-1] > limit - 1e-6:
                         self.ending = f"stopped after {limit:g} s"
-        return summary()
+            except BaseException as error:
+                wrong = f"error: {type(error).__name__}: {error}"
+                self.ending = "interrupted" if isinstance(error, KeyboardInterrupt) else wrong
+                raise
+        return self.summary()
 
-    def step(self) -> None:
+    def _go_on(self) -> None:
         """One control period."""
         recorded = self._recorded()
         with self._timed("simulation"):
-            action = self.policy.act(self.observation)
-            phase = self.policy.phase
-            if phase != self.phases[-1][1]:
-                self.phases.append((self.sim.time, phase))
-                self._event(phase)
-            step = self.env.step(action)
-        self.observation, reward, terminated, truncated, self.info = step
-        self.total += float(reward)
+            self.last = next(self._steps)
         self.wall["simulation"] -= self._recorded() - recorded
-        self.wall["recording"] = self._recorded()
-        self._sample()
-        self.ending = how_it_ended(terminated, truncated, self.info) or ""
-        whole = truncated and "truncation_reason" not in self.info
-        self.success = self.info["success"] or bool(whole and self.task.legs)
-        if self.info.get("touched", False) and not self.success:
-            self.held_until = phase
+        self._see(self.last)
+        self.ending = self.last.ending
         if self._film is not None:
             with self._timed("video"):
                 self._film.frame()
 
+    def _see(self, step: Step) -> None:
+        sim = self.sim
+        self.total += step.reward
+        self.clock.append(sim.time)
+        for name in ("power", "temperature", "tension"):
+            self.samples[name].append(np.array(getattr(sim, name)))
+        self.samples["body"].append(np.where(sim.embedded, sim.body_temperature, np.nan))
+        self.samples["bend"].append(np.degrees(self.task.bent()))
+        self.places.append(self.task.headway())
+        if step.info.get("touched", False) and not step.succeeded(self.task):
+            self.held_until = self.phases[-1][1]
+
+    def _note_phase(self) -> None:
+        """Notes what the policy is doing from now on, if that is new."""
+        phase = self.policy.phase
+        if not self.phases or phase != self.phases[-1][1]:
+            self.phases.append((self.sim.time, phase))
+            if self.recording is not None:
+                self.recording.event(phase)
+
     def summary(self) -> dict[str, Any]:
-        """What is known of every episode so far; see ``tca_mj.agents.demo`` for the keys."""
-        names, end = self.sim.tca_names, self.clock[-1]
-        starts = [start for start, _ in self.phases]
-        written = [RECORDING, VIDEO, PLOT]
-        return {
+        """What is known of the episode so far; see ``tca_mj.agents.demo.play`` for the keys."""
+        names, spines, end = self.sim.tca_names, self.sim.spines, self.clock[-1]
+        self.wall["recording"] = self._recorded()
+        found = {
+            "task": self.names[0],
+            "policy": self.names[1],
             "seed": self.seed,
-            "success": self.success,
+            "success": self.last.succeeded(self.task),
             "return": self.total,
             "held_until": self.held_until,
             "ending": self.ending or "still running",
@@ -155,7 +169,7 @@ class Episode:
             "real_time_factor": round(end / max(self.wall["simulation"], 1e-9), 2),
             "phases": [
                 {"name": name, "start": round(start, 6), "duration": round(until - start, 6)}
-                for (start, name), until in zip(self.phases, [*starts[1:], end], strict=True)
+                for name, start, until in self._spans()
             ],
             "energy": _by_name(names, self.sim.energy),
             "peak_temperature": _by_name(names, np.max(self.samples["temperature"], axis=0)),
@@ -163,9 +177,17 @@ class Episode:
             **self._headway(),
             "versions": versions(),
             "machine": machine(),
-            "files": [n for n in written if self.out is not None and (self.out / n).is_file()],
+            "files": [n for n in self.files if self.out is not None and (self.out / n).is_file()],
             "left_out": self.left_out,
+            "heater_energy": dict(zip(spines.names, spines.energy.tolist(), strict=True)),
+            **self.task.outcome(),
         }
+        return found | ({"tries": self.policy.tries} if hasattr(self.policy, "tries") else {})
+
+    def _spans(self) -> list[tuple[str, float, float]]:
+        """Name, start and end of each phase."""
+        ends = [*(start for start, _ in self.phases[1:]), self.clock[-1]]
+        return [(name, start, end) for (start, name), end in zip(self.phases, ends, strict=True)]
 
     def _headway(self) -> dict[str, Any]:
         """How far a robot has got that is to get on, and how fast in each phase."""
@@ -173,81 +195,49 @@ class Episode:
         if not len(way):
             return {}
         rows = []
-        starts = [start for start, _ in self.phases]
-        for (start, name), end in zip(self.phases, [*starts[1:], self.clock[-1]], strict=True):
+        for name, start, end in self._spans():
             ends = np.interp([start, end], self.clock, way[:, 0])
             distance = float(ends[1] - ends[0])
-            rows.append(
-                {
-                    "name": name,
-                    "distance": round(distance, 6),
-                    "speed": round(distance / max(end - start, 1e-9), 6),
-                    "published": self.task.published_speed.get(name),
-                }
-            )
+            speed = round(distance / max(end - start, 1e-9), 6)
+            row = {"name": name, "distance": round(distance, 6), "speed": speed}
+            rows.append(row | {"published": self.task.published_speed.get(name)})
         distance, drift = (way[-1] - way[0]).tolist()
         return {"distance": distance, "drift": drift, "speeds": rows}
 
-    def _write(self, summary: Callable[[], dict[str, Any]]) -> None:
-        """Replaces the file in one go, so that there is always a whole one."""
-        if self.out is not None:
-            self.wall["recording"] = self._recorded()
-            text = json.dumps(summary(), indent=2, ensure_ascii=False) + "\n"
-            write_whole(self.out / SUMMARY, text.encode())
-
-    def _begin_film(self, speed: float) -> None:
-        """Films the first frame; without OpenGL or an encoder it says so and goes on without."""
-        if self.out is not None:
-            with self._timed("video"), self._attempt(VIDEO):
-                path = self.out / VIDEO
-                self._film = Film(self.sim, path, fps=_FPS, speed=speed, camera=self.task.camera)
-                self._film.frame()
+    def _write(self, out: Path) -> None:
+        write_json(out / SUMMARY, self.summary())
 
     def _end_film(self) -> None:
-        """Finishes the film."""
         if self._film is not None:
             with self._timed("video"):
                 self._film.close()
 
-    def _plot(self) -> None:
-        """Draws the rollout; without Matplotlib it says so."""
-        if self.out is not None:
-            samples = {name: np.array(rows) for name, rows in self.samples.items()}
-            with self._timed("plot"), self._attempt(PLOT):
-                rollout_plot(
-                    self.out / PLOT,
-                    self.clock,
-                    samples["power"],
-                    samples["temperature"],
-                    samples["tension"],
-                    samples["bend"],
-                    [name.partition(".")[2] for name in self.sim.tca_names],
-                    self.phases,
-                    body=samples["body"] if self.sim.embedded.any() else None,
-                    title=f"{self._title}, seed {self.seed}: {self.ending}",
-                )
+    def _plot(self, path: Path) -> None:
+        samples = {name: np.array(rows) for name, rows in self.samples.items()}
+        task, policy = self.names
+        with self._attempt("plot", PLOT):
+            rollout_plot(
+                path,
+                self.clock,
+                samples["power"],
+                samples["temperature"],
+                samples["tension"],
+                samples["bend"],
+                [name.partition(".")[2] for name in self.sim.tca_names],
+                self.phases,
+                body=samples["body"] if self.sim.embedded.any() else None,
+                title=f"{policy} in {task}, seed {self.seed}: {self.ending}",
+            )
 
     @contextmanager
-    def _named_errors(self) -> Iterator[None]:
-        """Notes what ended the episode from outside."""
-        try:
-            yield
-        except KeyboardInterrupt:
-            self.ending = "interrupted"
-            raise
-        except BaseException as error:
-            self.ending = f"error: {type(error).__name__}: {error}"
-            raise
-
-    @contextmanager
-    def _attempt(self, name: str) -> Iterator[None]:
+    def _attempt(self, purpose: str, name: str) -> Iterator[None]:
         """Lets a file be left out if the machine lacks what it takes."""
-        try:
-            yield
-        except (ImportError, RenderingUnavailable) as error:
-            self.left_out[name] = str(error)
-            self._film = None if name == VIDEO else self._film
-            tqdm.write(f"{name} is left out: {error}")
+        with self._timed(purpose):
+            try:
+                yield
+            except (ImportError, RenderingUnavailable) as error:
+                self.left_out[name] = str(error)
+                tqdm.write(f"{name} is left out: {error}")
 
     @contextmanager
     def _timed(self, purpose: str) -> Iterator[None]:
@@ -259,20 +249,7 @@ class Episode:
 
     def _recorded(self) -> float:
         """Time spent on the recording so far [s]."""
-        return self.env.seconds if isinstance(self.env, RecordRerun) else 0.0
-
-    def _event(self, text: str) -> None:
-        if isinstance(self.env, RecordRerun):
-            self.env.event(text)
-
-    def _sample(self) -> None:
-        sim = self.sim
-        self.clock.append(sim.time)
-        for name in ("power", "temperature", "tension"):
-            self.samples[name].append(np.array(getattr(sim, name)))
-        self.samples["body"].append(np.where(sim.embedded, sim.body_temperature, np.nan))
-        self.samples["bend"].append(np.degrees(self.task.bent()))
-        self.places.append(self.task.headway())
+        return 0.0 if self.recording is None else self.recording.seconds
 
 
 def _by_name(names: tuple[str, ...], values: NDArray[np.float64]) -> dict[str, float]:

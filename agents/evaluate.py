@@ -7,14 +7,13 @@ or on the episodes before it.
 
 import hashlib
 import json
-import multiprocessing
 import os
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
-from contextlib import contextmanager
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import gymnasium as gym
 import numpy as np
@@ -23,15 +22,17 @@ from tqdm import tqdm
 
 import tca_mj  # noqa: F401  (registers the tasks in a new process)
 from tca_mj.agents.design import robot_of
-from tca_mj.agents.policies import find
 from tca_mj.agents.policies.actors import NAMES, actor, arguments_of, best_of
+from tca_mj.agents.policies.files import find
 from tca_mj.agents.rollout import rollout
-from tca_mj.envs.task import how_it_ended
+from tca_mj.agents.workers import Workers
+from tca_mj.checks import Checked, Count, number, require_count
 from tca_mj.files import write_whole
 from tca_mj.machine import machine, versions
+from tca_mj.pages import table, write_result
 from tca_mj.registry import make, task_class
 
-EPISODES, SUMMARY, REPORT = "episodes.jsonl", "summary.json", "summary.md"
+EPISODES, REPORT = "episodes.jsonl", "summary.md"
 
 # Name, unit, factor to the unit, and digits of what is reported.
 METRICS = {
@@ -52,7 +53,7 @@ _LEVEL, _RESAMPLES = 0.95, 10_000
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
-class Evaluation:
+class Evaluation(Checked):
     """What is evaluated.
 
     Attributes:
@@ -73,9 +74,9 @@ class Evaluation:
 
     task: str
     policy: str = "scripted"
-    episodes: int = 10
+    episodes: Count = 10
     seed: int = 0
-    randomise: float = 0.0
+    randomise: Annotated[float, partial(number, at_least=0.0, at_most=0.5)] = 0.0
     steps: int | None = None
     model: str = "used"
     timestep: float | None = None
@@ -84,18 +85,13 @@ class Evaluation:
     def __post_init__(self) -> None:
         models = ("used", *task_class(self.task).finer)
         if self.model not in models:
-            raise ValueError(
-                f"model must be one of {models} for {self.task}, got {self.model!r}"
-            )
-        if not 0.0 <= self.randomise <= 0.5:
-            raise ValueError(f"randomise must be between 0 and 0.5, got {self.randomise}")
+            raise ValueError(f"model must be one of {models} for {self.task}, got {self.model!r}")
+        Checked.__post_init__(self)
+        require_count(steps=1 if self.steps is None else self.steps)
         if self.design:
             robot_of(self.task, self.design)
-        for name, value, least in (
-            ("episodes", self.episodes, 1), ("seed", self.seed, 0), ("steps", self.steps, 1)
-        ):  # fmt: skip
-            if value is not None and (int(value) != value or value < least):
-                raise ValueError(f"{name} must be a whole number of at least {least}, got {value}")
+        if self.seed < 0 or int(self.seed) != self.seed:
+            raise ValueError(f"seed must be a whole number of at least 0, got {self.seed}")
 
     @property
     def options(self) -> dict[str, float]:
@@ -144,25 +140,21 @@ def run_episode(evaluation: Evaluation, seed: int) -> dict[str, Any]:
     try:
         policy = actor(evaluation.policy, env, seed=seed)
         task: Any = env.unwrapped
-        sim, start, total, steps = task.sim, None, 0.0, -1
-        hottest, tightest = -np.inf, 0.0
-        for step in rollout(env, policy, seed=seed, options=evaluation.options):
+        episode = rollout(env, policy, seed=seed, options=evaluation.options)
+        step, start = next(episode), task.headway()
+        total, hottest, tightest, steps = 0.0, -np.inf, 0.0, 0
+        for step in episode:
             total, steps = total + step.reward, steps + 1
-            if not steps:
-                start = task.headway()
-                continue
-            hottest = max(hottest, float(sim.temperature.max()))
-            tightest = max(tightest, float(sim.tension.max()))
-        info, truncated = step.info, step.truncated
-        whole = bool(truncated and "truncation_reason" not in info)
+            hottest = max(hottest, float(task.sim.temperature.max()))
+            tightest = max(tightest, float(task.sim.tension.max()))
         row = {
             "seed": seed,
             "steps": steps,
-            "ending": how_it_ended(step.terminated, truncated, info) or "",
+            "ending": step.ending,
             "return": total,
-            "success": bool(info["success"] or (whole and task.legs)),
-            "duration": float(sim.time),
-            "energy": float(sim.energy.sum() + sim.spines.energy.sum()),
+            "success": step.succeeded(task),
+            "duration": float(task.sim.time),
+            "energy": float(task.energy),
             "peak_temperature": hottest,
             "peak_tension": tightest,
         }
@@ -172,7 +164,7 @@ def run_episode(evaluation: Evaluation, seed: int) -> dict[str, Any]:
             row |= {
                 "distance": along,
                 "drift": abs(end.aside - start.aside),
-                "speed": along / sim.time,
+                "speed": along / task.sim.time,
                 "weight": end.weight,
             }
         return row
@@ -208,8 +200,7 @@ def evaluate(
         ValueError: If it is for another task, or ``workers`` is below 1.
         KeyboardInterrupt: As it came; the episodes that were finished are kept.
     """
-    if workers < 1:
-        raise ValueError(f"workers must be at least 1, got {workers}")
+    require_count(workers=workers)
     key = evaluation.key()
     env = evaluation.make()
     actor(evaluation.policy, env)  # before any process starts: a wrong name is said at once
@@ -222,8 +213,8 @@ def evaluate(
     missing = [seed for seed in seeds if seed not in done]
     bar = tqdm(total=len(seeds), initial=len(seeds) - len(missing), unit="episode",
                disable=None if progress else True)  # fmt: skip
-    with bar, _running(evaluation, missing, workers) as results:
-        for row in results:
+    with bar, Workers(min(workers, len(missing))) as processes:
+        for _, row in processes.run(run_episode, [(evaluation, seed) for seed in missing]):
             done[row["seed"]] = row
             if path is not None:
                 _append(path, {"key": key, **row})
@@ -237,28 +228,8 @@ def evaluate(
         "versions": versions(),
         "machine": machine(),
     }
-    if out is not None:
-        text = json.dumps(summary, indent=2, ensure_ascii=False) + "\n"
-        write_whole(out / SUMMARY, text.encode())
-        write_whole(out / REPORT, (report(summary) + "\n").encode())
+    write_result(out, "summary", summary, report(summary))
     return summary
-
-
-@contextmanager
-def _running(
-    evaluation: Evaluation, seeds: Sequence[int], workers: int
-) -> Iterator[Iterator[dict[str, Any]]]:
-    """Episodes in the order in which they end, in this process or in others."""
-    if workers == 1 or len(seeds) < 2:
-        yield (run_episode(evaluation, seed) for seed in seeds)
-        return
-    context = multiprocessing.get_context("spawn")
-    pool = ProcessPoolExecutor(min(workers, len(seeds)), mp_context=context)
-    try:
-        waiting = [pool.submit(run_episode, evaluation, seed) for seed in seeds]
-        yield (future.result() for future in as_completed(waiting))
-    finally:
-        pool.shutdown(cancel_futures=True)
 
 
 def kept(path: Path, key: str) -> dict[int, dict[str, Any]]:
@@ -297,16 +268,16 @@ def figures(rows: Sequence[dict[str, Any]]) -> dict[str, dict[str, float | None]
     transport E/(m g d) are ratios of sums over episodes, with percentiles of 10 000 bootstrap
     resamples of the episodes; they are None if the robot did not get on.
     """
+    columns = {name: np.array([float(row[name]) for row in rows])
+               for name in (*METRICS, "weight") if name in rows[0]}  # fmt: skip
     found: dict[str, dict[str, float | None]] = {}
     for name in METRICS:
-        if name in _RATIOS and "distance" in rows[0]:
-            distance = np.array([row["distance"] for row in rows])
-            if name == "cost_of_transport":
-                distance = distance * [row["weight"] for row in rows]
-            found[name] = _ratio(np.array([row["energy"] for row in rows]), distance)
-        elif name in rows[0]:
-            values = np.array([float(row[name]) for row in rows])
-            low, high = (_share if name == "success" else _t)(values)
+        if name in _RATIOS and "distance" in columns:
+            per = columns["weight"] if name == "cost_of_transport" else 1.0
+            found[name] = _ratio(columns["energy"], columns["distance"] * per)
+        elif name in columns:
+            values = columns[name]
+            low, high = _interval(name, values)
             found[name] = {
                 "mean": float(values.mean()), "low": low, "high": high,
                 "least": float(values.min()), "most": float(values.max()),
@@ -314,21 +285,19 @@ def figures(rows: Sequence[dict[str, Any]]) -> dict[str, dict[str, float | None]
     return found
 
 
-def _t(values: NDArray[np.float64]) -> tuple[float | None, float | None]:
-    if len(values) < 2:
-        return None, None
+def _interval(name: str, values: NDArray[np.float64]) -> tuple[float | None, float | None]:
+    """Wilson's interval of ``success``, Student's of a mean."""
     from scipy import stats  # loaded late: it takes a second
 
-    half = float(stats.t.ppf(0.5 + _LEVEL / 2.0, len(values) - 1) * stats.sem(values))
-    return float(values.mean()) - half, float(values.mean()) + half
-
-
-def _share(values: NDArray[np.float64]) -> tuple[float | None, float | None]:
-    from scipy import stats
-
-    test = stats.binomtest(round(float(values.sum())), len(values))
-    interval = test.proportion_ci(_LEVEL, method="wilson")
-    return float(interval.low), float(interval.high)
+    n, mean = len(values), float(values.mean())
+    if name == "success":
+        test = stats.binomtest(round(float(values.sum())), n)
+        share = test.proportion_ci(_LEVEL, method="wilson")
+        return float(share.low), float(share.high)
+    if n < 2:
+        return None, None
+    half = float(stats.t.ppf(0.5 + _LEVEL / 2.0, n - 1) * stats.sem(values))
+    return mean - half, mean + half
 
 
 def _ratio(above: NDArray[np.float64], below: NDArray[np.float64]) -> dict[str, float | None]:
@@ -349,42 +318,45 @@ def _ratio(above: NDArray[np.float64], below: NDArray[np.float64]) -> dict[str, 
     return {**nothing, "mean": mean, **interval, **extremes}
 
 
+def label(name: str) -> str:
+    """A figure's name and unit, as the title of a row or column."""
+    unit = METRICS[name][0]
+    return name.replace("_", " ") + (f" [{unit}]" if unit else "")
+
+
 def cell(name: str, figure: dict[str, float | None], *, interval: bool = True) -> str:
     """A figure in its unit: mean, and the interval in brackets."""
+    text, low, high, *_ = _shown(name, figure)
+    return f"{text} ({low} to {high})" if interval and low else text
+
+
+def _shown(name: str, figure: dict[str, float | None]) -> list[str]:
+    """Mean, low, high, least and most of a figure in its unit, empty where there is none."""
     _, factor, digits = METRICS[name]
-
-    def number(value: float | None) -> str:
-        return "" if value is None else f"{round(factor * value, digits) + 0.0:.{digits}f}"
-
-    text = number(figure["mean"])
-    if interval and figure["low"] is not None:
-        text += f" ({number(figure['low'])} to {number(figure['high'])})"
-    return text
+    values = [figure.get(key) for key in ("mean", "low", "high", "least", "most")]
+    return ["" if v is None else f"{round(factor * v, digits) + 0.0:.{digits}f}" for v in values]
 
 
 def report(summary: dict[str, Any]) -> str:
     """A summary as Markdown."""
     settings, rows = summary["settings"], summary["episodes"]
-    lines = [
-        f"{settings['policy']} in {settings['task']}, {len(rows)} episodes: mean, 95 % interval"
-        " (Student's t; success: Wilson; energy per metre and cost of transport: bootstrap)",
-        "",
-        "| figure | mean | 95 % interval | least | most |",
-        "|---|---|---|---|---|",
-    ]
+    lines = []
     for name, figure in summary["figures"].items():
-        unit, factor, digits = METRICS[name]
-        values = [figure[key] for key in ("mean", "low", "high", "least", "most")]
-        cells = ["" if value is None else f"{factor * value:.{digits}f}" for value in values]
-        between = f"{cells[1]} to {cells[2]}" if cells[1] else ""
-        label = name.replace("_", " ") + (f" [{unit}]" if unit else "")
-        lines.append(f"| {label} | {cells[0]} | {between} | {cells[3]} | {cells[4]} |")
-    return "\n".join(lines + ["", *endings(rows)])
+        mean, low, high, *extremes = _shown(name, figure)
+        lines.append([label(name), mean, f"{low} to {high}" if low else "", *extremes])
+    return "\n".join(
+        [
+            f"{settings['policy']} in {settings['task']}, {len(rows)} episodes: mean, 95 % interval"
+            " (Student's t; success: Wilson; energy per metre and cost of transport: bootstrap)",
+            "",
+            *table(["figure", "mean", "95 % interval", "least", "most"], lines),
+            "",
+            *endings(rows),
+        ]
+    )
 
 
 def endings(rows: Iterable[dict[str, Any]]) -> list[str]:
     """How the episodes ended, as Markdown."""
-    counts: dict[str, int] = {}
-    for row in rows:
-        counts[row["ending"]] = counts.get(row["ending"], 0) + 1
+    counts = Counter(row["ending"] for row in rows)
     return [f"* {count} x {ending}" for ending, count in sorted(counts.items())]

@@ -1,6 +1,7 @@
-"""The one loop in which a policy acts in a task."""
+"""The one loop in which a policy acts in a task, and what its steps have earned."""
 
-from collections.abc import Iterator, Mapping
+from collections import defaultdict
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -9,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tca_mj.agents.policies import Policy
+from tca_mj.envs.task import how_it_ended
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,9 +31,14 @@ class Step:
     info: dict[str, Any]
 
     @property
-    def over(self) -> bool:
-        """Whether it is the last one of the episode."""
-        return self.terminated or self.truncated
+    def ending(self) -> str:
+        """Why the episode is over, in a few words; empty if it goes on."""
+        return how_it_ended(self.terminated, self.truncated, self.info) or ""
+
+    def succeeded(self, task: Any) -> bool:
+        """Whether a task is done; a gait's is if it has come to the end of its time."""
+        whole = self.truncated and "truncation_reason" not in self.info
+        return bool(self.info["success"] or (whole and task.legs))
 
 
 def rollout(
@@ -40,6 +47,7 @@ def rollout(
     *,
     seed: int | None = None,
     options: Mapping[str, Any] | None = None,
+    decided: Callable[[], None] = lambda: None,
 ) -> Iterator[Step]:
     """An episode: its beginning, then every step, to its end or until nobody asks for more.
 
@@ -48,12 +56,33 @@ def rollout(
         policy: Who acts; it is reset first.
         seed: Seed of the episode.
         options: Options of the reset.
+        decided: Called when the policy has said what it does and nothing has happened yet.
     """
     policy.reset()
     observation, info = env.reset(seed=seed, options=dict(options) if options else None)
     step = Step(observation, 0.0, False, False, info)
     yield step
-    while not step.over:
-        observation, reward, terminated, truncated, info = env.step(policy.act(step.observation))
+    while not (step.terminated or step.truncated):
+        action = policy.act(step.observation)
+        decided()
+        observation, reward, terminated, truncated, info = env.step(action)
         step = Step(observation, float(reward), terminated, truncated, info)
         yield step
+
+
+def tally(sums: dict[str, float], reward: float, info: Mapping[str, Any]) -> None:
+    """Adds to ``return``, ``length`` and each ``term_NAME`` what a step has earned."""
+    sums["return"] += float(reward)
+    sums["length"] += 1.0
+    for name, term in info.get("reward_terms", {}).items():
+        sums[f"term_{name}"] += float(term)
+
+
+def earned(steps: Iterable[Step]) -> dict[str, float]:
+    """Sums over a whole episode: ``return``, ``length``, ``success``, and each reward term."""
+    sums = defaultdict(float, dict.fromkeys(("return", "length", "success"), 0.0))
+    for number, step in enumerate(steps):
+        sums["success"] = float(step.info["success"])
+        if number:
+            tally(sums, step.reward, step.info)
+    return dict(sums)

@@ -6,9 +6,7 @@ loses what was under way, and so does a sweep that is called a second time. Ray 
 sweep begins; the extra ``sweep`` installs it.
 """
 
-import csv
 import hashlib
-import io
 import itertools
 import json
 import os
@@ -17,9 +15,12 @@ from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
-from tca_mj.agents.evaluate import Evaluation, evaluate
+from tca_mj.agents.evaluate import METRICS, Evaluation, cell, evaluate, label
+from tca_mj.agents.output import write_csv, write_json
+from tca_mj.checks import number, require_count
 from tca_mj.files import write_whole
 from tca_mj.machine import machine, versions
+from tca_mj.pages import table
 
 TRIALS, RESULT = "trials", "result.json"
 TABLE, PAGE, ABOUT = "results.csv", "results.md", "sweep.json"
@@ -104,24 +105,21 @@ class Trial:
     def config(self) -> Any:
         """Settings of the training, or None."""
         self.evaluation(Path())
-        change: dict[str, Any] = {
-            name.removeprefix("train."): value
-            for name, value in self.point.items()
-            if name.startswith("train.")
-        }
-        task = self.sweep.evaluation.task
+        task, algorithm = self.sweep.evaluation.task, self.sweep.algorithm
+        if algorithm is None:
+            return None
+        given = [name for name in self.point if name.startswith("train.")]
+        change: dict[str, Any] = {name[6:]: self.point[name] for name in given}
         try:
-            if self.sweep.algorithm == "cma":
+            if algorithm == "cma":
                 from tca_mj.agents.train.search import SearchConfig
 
-                return SearchConfig(**{"task": task, **change})
-            if self.sweep.algorithm is None:
-                return None
+                return replace(SearchConfig(task=task), **change)
             from tca_mj.agents.train.config import default_config
 
-            inner = {name.removeprefix("learner."): change.pop(name)
-                     for name in list(change) if name.startswith("learner.")}  # fmt: skip
-            config = default_config(task, self.sweep.algorithm, **change)
+            learner = [name for name in change if name.startswith("learner.")]
+            inner: dict[str, Any] = {name[8:]: change.pop(name) for name in learner}
+            config = default_config(task, algorithm, **change)
             return replace(config, learner=replace(config.learner, **inner))
         except TypeError as error:  # no such field
             raise ValueError(f"train: {error}") from error
@@ -140,18 +138,12 @@ class Trial:
                 train(config, folder, video=False, progress=False)
         summary = evaluate(self.evaluation(folder), out=folder / "evaluation", progress=False)
         result = {"point": dict(self.point), "figures": summary["figures"]}
-        text = json.dumps(result, indent=1, ensure_ascii=False) + "\n"
-        write_whole(folder / RESULT, text.encode())
+        write_json(folder / RESULT, result, indent=1)
         return result
 
 
 def run_sweep(
-    sweep: Sweep,
-    out: Path,
-    *,
-    workers: int = 2,
-    address: str | None = None,
-    failures: int = 3,
+    sweep: Sweep, out: Path, *, workers: int = 2, address: str | None = None, failures: int = 3
 ) -> list[dict[str, Any]]:
     """Runs what is missing of the trials and writes the table of all.
 
@@ -175,21 +167,17 @@ def run_sweep(
         RuntimeError: If trials ended in an error; what the others found is written.
         ValueError: If ``workers`` or ``failures`` is out of range.
     """
-    if workers < 1 or failures < 0:
-        raise ValueError(f"workers must be at least 1 and failures 0, got {workers, failures}")
+    require_count(workers=workers)
+    number("failures", failures, at_least=0)
     out = out.absolute()
     trials = sweep.trials()
-    folders = {trial.name: out / TRIALS / trial.name for trial in trials}
-    missing = [trial for trial in trials if not (folders[trial.name] / RESULT).is_file()]
+    files = [out / TRIALS / trial.name / RESULT for trial in trials]
+    missing = [trial for trial, file in zip(trials, files, strict=True) if not file.is_file()]
     about = {"axes": {k: list(v) for k, v in sweep.axes.items()}, "versions": versions("ray"),
              "machine": machine(), "command": repr(sweep)}  # fmt: skip
-    write_whole(out / ABOUT, (json.dumps(about, indent=1, ensure_ascii=False) + "\n").encode())
+    write_json(out / ABOUT, about, indent=1)
     errors = _tune(missing, out, workers, address, failures) if missing else {}
-    found = []
-    for trial in trials:
-        file = folders[trial.name] / RESULT
-        if file.is_file():
-            found.append(json.loads(file.read_text(encoding="utf-8")))
+    found = [json.loads(file.read_text(encoding="utf-8")) for file in files if file.is_file()]
     _write(sweep, found, out)
     if errors:
         raise RuntimeError(f"{len(errors)} trials ended in an error: {errors}")
@@ -241,26 +229,15 @@ def _tune(
 
 def _write(sweep: Sweep, found: Sequence[dict[str, Any]], out: Path) -> None:
     """The table, as CSV in SI units and as Markdown."""
-    from tca_mj.agents.evaluate import METRICS, cell
-
     names = [name for name in METRICS if any(name in row["figures"] for row in found)]
-    none = dict.fromkeys(("mean", "low", "high"))
     columns = [*sweep.axes, *(f"{name}{end}" for name in names for end in ("", "_low", "_high"))]
-    text = io.StringIO()
-    table = csv.DictWriter(text, columns, lineterminator="\n")
-    table.writeheader()
-    heads = [name.replace("_", " ") + (f" [{METRICS[name][0]}]" if METRICS[name][0] else "")
-             for name in names]  # fmt: skip
-    heads = [*sweep.axes, *heads]
-    lines = [f"| {' | '.join(heads)} |", "|---" * len(heads) + "|"]
+    data, lines = [], []
     for row in found:
-        flat = dict(row["point"])
-        figures = {name: row["figures"].get(name, none) for name in names}
-        for name, figure in figures.items():
-            flat |= {name: figure["mean"], f"{name}_low": figure["low"],
-                     f"{name}_high": figure["high"]}  # fmt: skip
-        table.writerow(flat)
+        figures = {name: row["figures"].get(name, {}) for name in names}
+        values = [figure.get(key) for figure in figures.values() for key in ("mean", "low", "high")]
+        data.append(dict(zip(columns, [*row["point"].values(), *values], strict=True)))
         cells = [cell(name, figure) for name, figure in figures.items()]
-        lines.append(f"| {' | '.join([*map(str, row['point'].values()), *cells])} |")
-    write_whole(out / TABLE, text.getvalue().encode())
-    write_whole(out / PAGE, ("\n".join(lines) + "\n").encode())
+        lines.append([*map(str, row["point"].values()), *cells])
+    write_csv(out / TABLE, data, columns)
+    page = table([*sweep.axes, *map(label, names)], lines)
+    write_whole(out / PAGE, ("\n".join(page) + "\n").encode())

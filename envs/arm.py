@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from tca_mj.assets import mjcf
 from tca_mj.envs.options import Option, Options, Setup, Uniform, variation_options
 from tca_mj.envs.table import Entry, Table
-from tca_mj.envs.task import SimulatedTask, TaskArguments, Verdict
+from tca_mj.envs.task import SimulatedTask, TaskArguments, Verdict, parts
 from tca_mj.envs.vector import TaskVector
 from tca_mj.model.scene import scene
 from tca_mj.robots.arm import ArmSpec, arm
@@ -124,10 +124,7 @@ class ArmPickPlace(SimulatedTask):
         Raises:
             ValueError: If the render mode is unknown or the arm cannot be built.
         """
-        own = type(self).control_period
-        updates = own / (5.0 * timestep) if timestep > 0.0 else 0.0
-        if not (np.isfinite(updates) and updates > 0.5 and abs(updates - round(updates)) < 1e-9):
-            raise ValueError(f"timestep must be {own} s over a multiple of 5, got {timestep}")
+        parts("timestep", type(self).control_period, timestep, of=5)
         self.arm_spec = arm_spec or ArmSpec()
         files = ["cup", *(name for kind in OBJECTS for name in (kind, f"{kind}_stand"))]
         part = scene(

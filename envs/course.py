@@ -10,9 +10,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from tca_mj.assets import mjcf
 from tca_mj.envs.options import Option, Options, Setup, Uniform, variation_options
-from tca_mj.envs.stance import CAMERAS, tetrapod_scene
+from tca_mj.envs.stance import CAMERAS, Stance, tetrapod_scene
 from tca_mj.envs.table import Entry, Table
-from tca_mj.envs.task import Headway, SimulatedTask, TaskArguments, Verdict
+from tca_mj.envs.task import Headway, SimulatedTask, TaskArguments, Verdict, parts
 from tca_mj.envs.vector import TaskVector
 from tca_mj.robots.tetrapod import LEGS, SPINES, TetrapodSpec
 from tca_mj.sim import Drive
@@ -164,33 +164,20 @@ class TetrapodCourse(SimulatedTask):
         Raises:
             ValueError: If an argument is unknown or the robot cannot be built.
         """
-        updates = type(self).control_period / tca_period if tca_period > 0.0 else 0.0
-        if not (updates > 0.5 and abs(updates - round(updates)) < 1e-9):
-            raise ValueError(
-                f"tca_period must divide the control period {type(self).control_period} s,"
-                f" got {tca_period}"
-            )
+        parts("tca_period", type(self).control_period, tca_period)
         self.robot = robot or _default()
         sim = tetrapod_scene(
             mjcf("course.xml"), {}, self.robot, timestep=timestep, period=tca_period
         )
         seen = OBSERVATION.covering({"TCA length": (0.0, float(sim.bank.longest.max()))})
         self._open(sim, seen, ACTION, _OPTIONS, **common)
+        self.stance = Stance(sim, self.robot)
         self._find(self.model)
         self.touched = False
         self._x, self._harmed = 0.0, 0
 
     def _find(self, model: mujoco.MjModel) -> None:
         """Looks up the addresses of what is observed and judged."""
-        self._hub = int(model.body("robot.hub").id)
-        self._root = int(model.jnt_qposadr[model.joint("robot.root").id])
-        bends = [
-            (model.joint(f"robot.{side}.bend_x{i}").qposadr[0], sign)
-            for side, sign in (("left", -1.0), ("right", 1.0))
-            for i in range(self.robot.nodes)
-        ]
-        self._bends = np.array([address for address, _ in bends])
-        self._signs = np.array([sign for _, sign in bends])
         self._plate = {model.geom(name).id for name in ("glass", "post0", "post1")}
 
         def end(name: str, sign: float) -> float:
@@ -211,19 +198,19 @@ class TetrapodCourse(SimulatedTask):
     @property
     def position(self) -> NDArray[np.float64]:
         """Position of the middle of the spines in the world, shape (3,) [m]."""
-        return self.data.qpos[self._root : self._root + 3]
+        return self.data.qpos[self.stance.root : self.stance.root + 3]
 
     @property
     def body_angle(self) -> float:
         """Bend of the body from rail to rail [rad]."""
-        return float(self.data.qpos[self._bends] @ self._signs)
+        return self.stance.bend(self.data)
 
     def prepare(self, setup: Setup) -> None:
         """Lays the robot before the plate."""
 
         def place(data: mujoco.MjData) -> None:
             turn = [np.cos(setup["yaw"] / 2.0), 0.0, 0.0, np.sin(setup["yaw"] / 2.0)]
-            data.qpos[self._root : self._root + 7] = [*setup["position"], _START, *turn]
+            data.qpos[self.stance.root : self.stance.root + 7] = [*setup["position"], _START, *turn]
 
         self.sim.reset(place)
         self.touched, self._harmed = False, 0
@@ -271,15 +258,14 @@ class TetrapodCourse(SimulatedTask):
 
     def _fallen(self) -> bool:
         """Whether the robot has turned over or dropped into the gap."""
-        _, x, y, _ = self.data.qpos[self._root + 3 : self._root + 7]
+        _, x, y, _ = self.data.qpos[self.stance.root + 3 : self.stance.root + 7]
         return bool(1.0 - 2.0 * (x * x + y * y) < _TURNED or self.position[2] < _LOST)
 
     def observe(self) -> dict[str, ArrayLike]:
         """See ``OBSERVATION``."""
         data, sim = self.data, self.sim
-        start = self._root
+        start, dof = self.stance.root, self.stance.motion
         turn = data.qpos[start + 3 : start + 7]
-        dof = int(self.model.jnt_dofadr[self.model.joint("robot.root").id])
         return {
             "TCA temperature": sim.temperature,
             "TCA length": sim.length,
@@ -307,7 +293,7 @@ class TetrapodCourse(SimulatedTask):
     def headway(self) -> Headway:
         """Along the course, from its beginning."""
         x, y, _ = self.position.tolist()
-        weight = 9.81 * float(self.model.body_subtreemass[self._hub])
+        weight = 9.81 * float(self.model.body_subtreemass[self.stance.hub])
         return Headway(along=x, aside=y, weight=weight)
 
     def outcome(self) -> dict[str, Any]:

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from tca_mj.envs.hanging import hang
 from tca_mj.envs.options import Option, Options, Setup, Uniform, variation_options
 from tca_mj.envs.table import Entry, Table
-from tca_mj.envs.task import SimulatedTask, TaskArguments, Verdict
+from tca_mj.envs.task import SimulatedTask, TaskArguments, Verdict, parts
 from tca_mj.envs.vector import TaskVector
 from tca_mj.model.part import Part
 from tca_mj.modules.morphing import MorphingSpec, morphing_module
@@ -121,11 +121,7 @@ class MorphModule(SimulatedTask):
             ValueError: If an argument is out of range or the module cannot be built.
         """
         own = type(self).control_period
-        steps = own / timestep if timestep > 0.0 else 0.0
-        if not (np.isfinite(steps) and steps > 0.5 and abs(steps - round(steps)) < 1e-9):
-            raise ValueError(
-                f"timestep must be {own} s over a whole number, got {timestep}"
-            )
+        parts("timestep", own, timestep)
         self.module_spec = module_spec or _default()
         part = hanging_module(self.module_spec)
         sim = Simulation(part, timestep=timestep, tca_period=own)

@@ -114,6 +114,7 @@ class Stance:
 
     Attributes:
         hub: Id of the body in the middle of its spines.
+        root, motion: Where its seven positions and six velocities begin.
         feet: Ids of the sites in the middle of its feet, in the order of ``LEGS``.
     """
 
@@ -123,7 +124,7 @@ class Stance:
         self.hub = int(model.body("robot.hub").id)
         self.feet = np.array([model.site(f"robot.{leg}.foot").id for leg in LEGS])
         root = model.joint("robot.root").id
-        self._q, self._v = int(model.jnt_qposadr[root]), int(model.jnt_dofadr[root])
+        self.root, self.motion = int(model.jnt_qposadr[root]), int(model.jnt_dofadr[root])
 
         def address(names: list[str]) -> NDArray[np.int64]:
             return np.array(
@@ -169,7 +170,7 @@ class Stance:
 
     def velocity(self, data: mujoco.MjData) -> tuple[Array, Array]:
         """Of the hub in its own frame: linear [m/s] and angular [rad/s], shape (3,) each."""
-        v = data.qvel[self._v : self._v + 6]
+        v = data.qvel[self.motion : self.motion + 6]
         return self.rotation(data).T @ v[:3], v[3:]
 
     def feet_in_body(self, data: mujoco.MjData) -> Array:
@@ -213,11 +214,11 @@ class Stance:
             data.qpos[self._bends] = self._signs * bend / (2 * self._nodes)
             data.qpos[self._beside] = -bend / (2 * self._nodes)
             turn = (math.cos(yaw / 2.0), 0.0, 0.0, math.sin(yaw / 2.0))
-            data.qpos[self._q : self._q + 7] = (*position, above, *turn)
+            data.qpos[self.root : self.root + 7] = (*position, above, *turn)
 
             def at(height: float, spread: float | Array) -> tuple[bool, NDArray[np.bool_]]:
                 """Whether something is touched from above, and by which legs from the side."""
-                data.qpos[self._q + 2] = height
+                data.qpos[self.root + 2] = height
                 data.qpos[self._lifts] = np.broadcast_to(spread, len(LEGS))[:, None]
                 mujoco.mj_kinematics(self._model, data)
                 mujoco.mj_collision(self._model, data)

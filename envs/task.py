@@ -550,6 +550,19 @@ def together(before: Outcome | None, now: Outcome) -> Outcome:
     return observation, float(sum(terms.values())), terminated, truncated, info
 
 
+def parts(name: str, whole: float, part: float, *, of: int = 1) -> int:
+    """How many times ``part`` makes up a time ``whole``, a multiple of ``of``.
+
+    Raises:
+        ValueError: If it is no such number; ``name`` is what ``part`` is called.
+    """
+    count = round(whole / part) if np.isfinite(part) and part > 0.0 else 0
+    if count < 1 or abs(count * part - whole) > 1e-9 or count % of:
+        number = f"multiple of {of}" if of > 1 else "whole number"
+        raise ValueError(f"{name} must be {whole} s over a {number}, got {part}")
+    return count
+
+
 def _divides(part: float, whole: float) -> bool:
     """Whether a time is a whole number of others."""
     count = round(whole / part)

@@ -12,7 +12,7 @@ from tca_mj.assets import mjcf
 from tca_mj.envs.options import Constant, Option, Options, Setup, Uniform, variation_options
 from tca_mj.envs.stance import CAMERAS, LEG_TCAS, Stance, tetrapod_scene
 from tca_mj.envs.table import Entry, Table
-from tca_mj.envs.task import Headway, SimulatedTask, TaskArguments, TaskState, Verdict
+from tca_mj.envs.task import Headway, SimulatedTask, TaskArguments, TaskState, Verdict, parts
 from tca_mj.envs.vector import TaskVector
 from tca_mj.robots.tetrapod import LEGS, TetrapodSpec
 from tca_mj.sim import Drive
@@ -313,11 +313,7 @@ def _period(control_period: float, timestep: float) -> float:
     Raises:
         ValueError: If the control period is no multiple of the time step.
     """
-    steps = round(control_period / timestep) if timestep > 0.0 else 0
-    if steps < 1 or abs(steps * timestep - control_period) > 1e-9:
-        raise ValueError(
-            f"timestep must be {control_period} s over a whole number, got {timestep}"
-        )
+    steps = parts("timestep", control_period, timestep)
     updates = next((n for n in range(_UPDATES, steps) if steps % n == 0), steps)
     return control_period / updates
 

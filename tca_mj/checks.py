@@ -4,7 +4,10 @@ Every message reads ``name must ..., got ...``.
 """
 
 import math
-from typing import Any
+from collections.abc import Callable
+from dataclasses import fields
+from functools import cache, partial
+from typing import Annotated, Any, Literal, get_args, get_origin
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -105,3 +108,45 @@ def require_count(**values: Any) -> None:
             raise ValueError(f"{name} must be a whole number, got {value!r}")
         if value < 1:
             raise ValueError(f"{name} must be at least 1, got {value!r}")
+
+
+def require_one_of(name: str, value: Any, choices: tuple[Any, ...]) -> None:
+    """Raises ValueError unless ``value`` is one of the choices."""
+    if value not in choices:
+        raise ValueError(f"{name} must be one of {choices}, got {value!r}")
+
+
+# Types of fields, which ``Checked`` checks. The plurals are numbers or arrays of them.
+Finite = Annotated[float, number]
+Positive = Annotated[float, partial(number, above=0.0)]
+NotNegative = Annotated[float, partial(number, at_least=0.0)]
+Temperature = Annotated[float, partial(number, above=-273.15)]
+Count = Annotated[int, lambda name, value: require_count(**{name: value})]
+Triple = Annotated[tuple[float, float, float], partial(within, shape=(3,))]
+Positives = Annotated[float | Array, partial(within, above=0.0)]
+NotNegatives = Annotated[float | Array, partial(within, at_least=0.0)]
+
+
+class Checked:
+    """A dataclass that checks itself: each field by what its type says.
+
+    That is ``Literal[...]`` or ``Annotated[..., check]``; a check takes name and value and raises
+    ValueError. What ties fields together is checked in a
+    ``__post_init__`` that calls this one first.
+    """
+
+    __slots__ = ()
+
+    def __post_init__(self) -> None:
+        kind: Any = type(self)
+        for name, check in _checks(kind):
+            check(name, getattr(self, name))
+
+
+@cache
+def _checks(kind: Any) -> tuple[tuple[str, Callable[[str, Any], Any]], ...]:
+    choices = {f.name: get_args(f.type) for f in fields(kind) if get_origin(f.type) is Literal}
+    return (
+        *((name, partial(require_one_of, choices=each)) for name, each in choices.items()),
+        *((f.name, check) for f in fields(kind) for check in getattr(f.type, "__metadata__", ())),
+    )

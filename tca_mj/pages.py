@@ -28,13 +28,23 @@ def made_with(result: dict[str, Any]) -> list[str]:
     return [f"{where['cpu']}, {where['cores']} cores; {where['system']}", kept]
 
 
-def picture(caption: str, path: str) -> list[str]:
-    """Lines of a picture with its caption below it."""
-    return [f"![{caption}]({path})", "", f"*{caption}*", ""]
+def picture(caption: str, path: str) -> str:
+    """A picture with its caption below it."""
+    return f"![{caption}]({path})\n\n*{caption}*"
 
 
-def write_result(out: Path, name: str, result: Any, text: str, *, indent: int = 2) -> None:
+def page(*blocks: str | Iterable[str]) -> str:
+    """Blocks of Markdown, as text or as lines, a blank line between two; without empty ones."""
+    texts = (block if isinstance(block, str) else "\n".join(block) for block in blocks)
+    return "\n\n".join(text for text in texts if text)
+
+
+def write_result(
+    out: Path | None, name: str, result: Any, text: str, *, indent: int = 2
+) -> None:
     """Writes a result as ``<name>.json`` and what it says as ``<name>.md`` into a folder."""
+    if out is None:
+        return
     data = json.dumps(result, indent=indent, ensure_ascii=False)
     for ending, content in ((".json", data), (".md", text)):
         write_whole(out / f"{name}{ending}", f"{content}\n".encode())

@@ -14,11 +14,11 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tca_mj.checks import Array, number, require_count
+from tca_mj.checks import Array, Checked, Finite, NotNegative, number, require_count
 
 
 @dataclass(frozen=True, slots=True)
-class Helix:
+class Helix(Checked):
     """A TCA wound round the centre line; ``turns=0`` gives the parallel route.
 
     Attributes:
@@ -30,14 +30,9 @@ class Helix:
         ValueError: If a number is not finite or the radius is negative.
     """
 
-    radius: float
-    turns: float = 0.0
-    phase: float = 0.0
-
-    def __post_init__(self) -> None:
-        number("radius", self.radius, at_least=0.0, unit="m")
-        number("turns", self.turns)
-        number("phase", self.phase)
+    radius: NotNegative
+    turns: Finite = 0.0
+    phase: Finite = 0.0
 
     @property
     def legs(self) -> tuple["Helix", ...]:
@@ -104,7 +99,6 @@ class Route(Protocol):
     @property
     def legs(self) -> tuple[Helix, ...]:
         """Legs in the order in which the TCA follows them, alternately up and down the body."""
-        ...
 
 
 def parallel(count: int, radius: float, phase: float = 0.0) -> tuple[Helix, ...]:
@@ -138,12 +132,6 @@ def leg_length(
     r = leg.offset(s)
     slope = leg.slope(s) / body_length
     u = np.asarray(curvature, dtype=np.float64)
-    w = np.stack(
-        [
-            slope[:, 0] - u[2] * r[:, 1],
-            slope[:, 1] + u[2] * r[:, 0],
-            1.0 + u[0] * r[:, 1] - u[1] * r[:, 0],
-        ],
-        axis=-1,
-    )
+    (x, y), (dx, dy) = r.T, slope.T
+    w = np.stack([dx - u[2] * y, dy + u[2] * x, 1.0 + u[0] * y - u[1] * x], axis=-1)
     return float(np.trapezoid(np.linalg.norm(w, axis=-1), s) * body_length)

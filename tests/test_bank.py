@@ -6,7 +6,10 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 
+from tca_mj.modules.bending import bending_module
+from tca_mj.sim import Simulation
 from tca_mj.tca import CATALOGUE, Pull, TcaBank, TcaState, WireTable, coil_tension, sensed_length
+from tca_mj.tca.arrays import column
 
 FREE_STROKE = CATALOGUE["free-stroke"]
 HOT_SECTION = replace(FREE_STROKE, fibre=replace(FREE_STROKE.fibre, section="hot"), ambient=20.0)
@@ -32,6 +35,44 @@ def test_a_bank_at_rest_neither_pulls_nor_cools():
     np.testing.assert_allclose(pull.tension, 0.0, atol=1e-12)
     assert not bank.broken(pull).any()
     assert not bank.overheated(state).any()
+
+
+class Springs:
+    """A law of one's own: TCAs as linear springs that shorten by 0.2 % per kelvin."""
+
+    STIFFNESS = 20.0  # [N/m]
+
+    def __init__(self, specs):
+        self.rest = column(specs, "rest_length")
+        self.shortest, self.longest = 0.5 * self.rest, 1.5 * self.rest
+
+    def tension(self, length, temperature):
+        free = self.rest * (1.0 - 2e-3 * (temperature - 25.0))
+        return self.STIFFNESS * (length - free), np.full_like(length, self.STIFFNESS)
+
+
+def test_a_law_of_ones_own_drives_a_bank():
+    bank, law = TcaBank(SPECS, law=Springs), Springs(SPECS)
+    assert bank.law is Springs
+    np.testing.assert_array_equal([bank.shortest, bank.longest], [law.shortest, law.longest])
+    state, power, length = random_inputs(bank, (3,))
+    after, pull = bank.advance(state, power, length, 0.02)
+    np.testing.assert_array_equal(pull.tension, law.tension(length, after.temperature)[0])
+    np.testing.assert_array_equal(pull.stiffness, law.STIFFNESS)
+    # Heat does not know the law.
+    rods, _ = TcaBank(SPECS).advance(state, power, bank.rest_length + 0.0 * length, 0.02)
+    np.testing.assert_array_equal(after.temperature, rods.temperature)
+
+
+def test_a_law_of_ones_own_moves_a_body():
+    sim = Simulation(bending_module(), law=Springs)
+    for _ in range(20):
+        sim.step([1.0, 0.0, 0.0], 0.02)
+    law = Springs(sim.bank.specs)
+    assert sim.temperature[0] > 35.0
+    tension, _ = law.tension(sim.pull.length, sim.temperature)
+    np.testing.assert_array_equal(sim.pull.tension, tension)
+    assert sim.length[0] < law.rest[0] - 1e-3  # the module bends towards it
 
 
 @pytest.mark.parametrize("contiguous", [True, False])

@@ -96,7 +96,7 @@ def test_a_bad_box_is_refused(field, value):
         ({"line_density": 0.0}, "line_density must be finite and above 0, got 0"),
         ({"curvature": (0.0, 1.0)}, r"curvature must be finite numbers of shape \(3,\), got"),
         ({"curvature": (0.0, math.nan, 0.0)}, "curvature must be finite, got"),
-        ({"damping_time": -1.0}, "damping_time must be finite and at least 0 s, got -1"),
+        ({"damping_time": -1.0}, "damping_time must be finite and at least 0, got -1"),
     ],
 )
 def test_a_bad_beam_is_refused(change, message):

@@ -13,11 +13,10 @@ import pytest
 
 from tca_mj import cli, registry
 from tca_mj.agents import demo
-from tca_mj.agents.policies.actors import arguments_of
+from tca_mj.agents.policies.actors import actor, arguments_of
 from tca_mj.bench import single, vector
-from tca_mj.cli.play import _policy
 from tca_mj.envs.arm import ArmPickPlace
-from tca_mj.envs.viewer import NoDisplay, ViewerEnvironment, need_display
+from tca_mj.envs.viewer import NoDisplay, ViewerEnvironment, ViewerPolicy, need_display
 
 TASK = "TCA/ArmPickPlace-v0"
 SUMMARY: dict[str, Any] = {
@@ -155,7 +154,8 @@ def test_the_viewer_steps_the_task_itself(
     monkeypatch.setenv("MUJOCO_GL", "disable")
     env = gym.make(TASK, **arguments_of(policy, TASK))
     shown = ViewerEnvironment(env, seed=2, options={"object": "pcb"})
-    act = _policy(policy, env, 2)
+    found = actor(policy, env, seed=2)
+    act = ViewerPolicy(found.act, found.reset)
     step = shown.reset()
     assert step.first()
     task = env.unwrapped

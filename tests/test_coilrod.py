@@ -9,6 +9,7 @@ import pytest
 from scipy.optimize import brentq, root
 
 import tca_mj.tca.laws.rod as coilrod
+import tca_mj.tca.laws.roots as roots
 from tca_mj.tca import CATALOGUE, CoilRods, CoilSolveError, coil_tension
 
 FREE_STROKE = CATALOGUE["free-stroke"]
@@ -306,7 +307,7 @@ def test_wrong_shapes_are_refused():
 
 def test_no_convergence_is_an_error(monkeypatch):
     monkeypatch.setattr(coilrod, "_STEPS", 0)
-    monkeypatch.setattr(coilrod, "_BRACKETED_STEPS", 2)
+    monkeypatch.setattr(roots, "_STEPS", 2)
     with pytest.raises(CoilSolveError) as caught:
         coil_tension(FREE_STROKE, 0.06, 150.0)
     assert caught.value.residual > 1e-13

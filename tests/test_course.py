@@ -41,8 +41,9 @@ def bent(env, angle, x, z):
     """Puts the robot, cold and fixed at an angle [rad], into the course."""
 
     def place(data):
-        data.qpos[env._root], data.qpos[env._root + 2] = x, z
-        data.qpos[env._bends] = env._signs * angle / (2 * env.robot.nodes)
+        root, stance = env.stance.root, env.stance
+        data.qpos[root], data.qpos[root + 2] = x, z
+        data.qpos[stance._bends] = stance._signs * angle / (2 * env.robot.nodes)
 
     env.sim.reset(place)
 

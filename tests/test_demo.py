@@ -41,6 +41,9 @@ class Stub:
     def phase(self) -> str:
         return "first" if self.calls < 3 else "second"
 
+    def reset(self) -> None:
+        self.calls = 0
+
     def act(self, observation: NDArray[np.float32]) -> NDArray[np.float32]:
         self.calls += 1
         if self.calls > self.at and self.fault is not None:

@@ -193,10 +193,10 @@ def WELDED(task):
             {"task": WALKING, "model": "coarse"},
             r"model must be one of \('used', 'legs', 'fine'\) for .*, got 'coarse'",
         ),
-        ({"randomise": 0.6}, "randomise must be between 0 and 0.5, got 0.6"),
-        ({"episodes": 0}, "episodes must be a whole number of at least 1, got 0"),
+        ({"randomise": 0.6}, "randomise must be finite and at least 0 and at most 0.5, got 0.6"),
+        ({"episodes": 0}, "episodes must be at least 1, got 0"),
         ({"seed": -1}, "seed must be a whole number of at least 0, got -1"),
-        ({"steps": 0}, "steps must be a whole number of at least 1, got 0"),
+        ({"steps": 0}, "steps must be at least 1, got 0"),
     ],
 )
 def test_bad_settings_are_refused(wrong, message):

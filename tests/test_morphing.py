@@ -292,7 +292,7 @@ def test_a_tca_that_pulls_at_a_stiff_spine_is_damaged():
         ({"mass": 0.0}, "mass must be finite and above 0, got 0.0"),
         ({"half_width": -1e-3}, "half_width must be finite and above 0, got -0.001"),
         ({"damping_time": math.nan}, "damping_time must be finite and above 0, got nan"),
-        ({"tip_mass": -1e-3}, "tip_mass must be finite and at least 0 kg, got -0.001"),
+        ({"tip_mass": -1e-3}, "tip_mass must be finite and at least 0, got -0.001"),
         ({"nodes": 2.5}, "nodes must be a whole number, got 2.5"),
         ({"motions": ("twist",)}, "motions must contain 'bend_x', got"),
     ],

@@ -175,7 +175,7 @@ def test_impossible_policies_are_refused(change, message):
         ({"clip": 0.0}, "clip must be finite and above 0"),
         ({"var": -np.ones(4)}, "var must be finite and at least 0"),
         ({"var": np.ones(3)}, "var must be a row like mean"),
-        ({"mean": np.full(4, np.nan)}, "must be finite numbers"),
+        ({"mean": np.full(4, np.nan)}, "mean must be finite, got"),
         ({"biases": ()}, "biases must be as many as weights"),
         ({"weights": (np.ones((12, 5), np.float32),)}, r"weights\[0\] must have the shape"),
     ],

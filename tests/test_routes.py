@@ -116,8 +116,8 @@ def test_parallel_routes_stand_at_equal_angles(count):
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: Helix(-1e-3), r"radius must be finite and at least 0 m, got -0\.001"),
-        (lambda: Helix(math.nan), "radius must be finite and at least 0 m, got nan"),
+        (lambda: Helix(-1e-3), r"radius must be finite and at least 0, got -0\.001"),
+        (lambda: Helix(math.nan), "radius must be finite and at least 0, got nan"),
         (lambda: Helix(1e-3, math.inf), "turns must be finite, got inf"),
         (lambda: Helix(1e-3, phase=math.nan), "phase must be finite, got nan"),
         (lambda: UTurn.parallel(1e-3, -1e-3), r"half_width must be .* at least 0 m, got -0\.001"),

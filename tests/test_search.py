@@ -18,7 +18,8 @@ from tca_mj.agents.train import search as searching
 from tca_mj.agents.train.gait_score import Headway, Reference, Trial, run_trial, score
 from tca_mj.agents.train.gait_space import PERIOD, GaitSpace
 from tca_mj.agents.train.runs import RunFolder
-from tca_mj.agents.train.search import TROT, SearchConfig, Trials, search
+from tca_mj.agents.train.search import TROT, SearchConfig, search
+from tca_mj.agents.workers import Workers
 from tca_mj.cli import main
 
 EVERY = GAITS | {"trot": replace(WALK, offset=TROT)}
@@ -126,7 +127,7 @@ def test_a_trial_that_ends_early_says_how_much_it_missed(monkeypatch):
 
 
 class Model:
-    """Stands for ``Trials``: a speed that falls with the distance from a hidden gait."""
+    """Stands for ``Workers``: a speed that falls with the distance from a hidden gait."""
 
     def __init__(self, stop_after: int | None = None) -> None:
         self.left, self.done = stop_after, 0
@@ -140,9 +141,9 @@ class Model:
     def __exit__(self, *error):
         pass
 
-    def run(self, jobs):
+    def run(self, function, jobs):
         space = GaitSpace(centre=WALK, hottest=172.0)
-        for i, job in reversed(list(enumerate(jobs))):
+        for i, (job,) in reversed(list(enumerate(jobs))):
             if self.left is not None and self.done >= self.left:
                 raise KeyboardInterrupt
             self.done += 1
@@ -171,7 +172,7 @@ def quiet(monkeypatch):
 @pytest.mark.usefixtures("quiet")
 def test_a_search_that_is_stopped_anywhere_goes_on_with_nothing_lost(monkeypatch, tmp_path):
     whole = Model()
-    monkeypatch.setattr(searching, "Trials", whole)
+    monkeypatch.setattr(searching, "Workers", whole)
     expected = search(TINY, tmp_path / "whole", progress=False)
     assert whole.done == 2 + 2 + 5 * 18 + 2 * 2
     curve = (tmp_path / "whole" / "curve.csv").read_bytes()
@@ -182,7 +183,7 @@ def test_a_search_that_is_stopped_anywhere_goes_on_with_nothing_lost(monkeypatch
     parts, found = [], None
     while found is None:
         parts.append(Model(stop_after=9))
-        monkeypatch.setattr(searching, "Trials", parts[-1])
+        monkeypatch.setattr(searching, "Workers", parts[-1])
         try:
             found = search(TINY, tmp_path / "parts", progress=False)
         except KeyboardInterrupt:
@@ -194,12 +195,14 @@ def test_a_search_that_is_stopped_anywhere_goes_on_with_nothing_lost(monkeypatch
 
 @pytest.mark.usefixtures("quiet")
 def test_a_search_finds_what_is_better(monkeypatch, tmp_path):
-    monkeypatch.setattr(searching, "Trials", Model())
+    monkeypatch.setattr(searching, "Workers", Model())
     config = replace(TINY, steps=60_000, sigma=0.1)
     found = search(config, tmp_path, progress=False)
-    reached = score([r for _, r in Model().run([brief(gait=found.gait, steering=found.steering)])],
-                    SCRIPTED)["speed"]  # fmt: skip
-    start = score([r for _, r in Model().run([brief(gait=WALK)])], SCRIPTED)["speed"]
+    best = brief(gait=found.gait, steering=found.steering)
+    reached, start = (
+        score([r for _, r in Model().run(run_trial, [(trial,)])], SCRIPTED)["speed"]
+        for trial in (best, brief(gait=WALK))
+    )
     assert start == pytest.approx(1.72, abs=0.01) and reached > start + 0.1
     assert SavedPolicy.read(tmp_path / "best.json") == found
     # It can be made longer, and not be taken for another run.
@@ -253,13 +256,13 @@ def test_a_killed_search_goes_on_to_the_same_curve(tmp_path):
 
 
 def test_an_error_in_a_process_arrives_and_so_does_its_end():
-    with Trials(2) as trials:
-        with pytest.raises(ValueError, match="randomise must be between"):
-            list(trials.run([brief(randomise=0.9)]))
-        for process in trials._processes:
+    with Workers(2) as workers:
+        with pytest.raises(ValueError, match="randomise must be"):
+            list(workers.run(run_trial, [(brief(randomise=0.9),)]))
+        for process in workers._processes:
             process.kill()
         with pytest.raises(RuntimeError, match="a process that ran episodes has ended"):
-            list(trials.run([brief(), brief()]))
+            list(workers.run(run_trial, [(brief(),), (brief(),)]))
 
 
 @pytest.mark.parametrize(
@@ -267,10 +270,10 @@ def test_an_error_in_a_process_arrives_and_so_does_its_end():
     [
         ({"task": "TCA/ArmPickPlace-v0"}, "task must have four legs"),
         ({"steps": 0}, "steps must be"),
-        ({"population": 4}, "population must be at least 5"),
-        ({"sigma": 0.0}, "sigma must be above 0"),
-        ({"randomise": 0.6}, "randomise must be between 0.0 and 0.5"),
-        ({"window": 26.0}, "window must be between"),
+        ({"population": 4}, "population must be finite and at least 5"),
+        ({"sigma": 0.0}, "sigma must be finite and above 0"),
+        ({"randomise": 0.6}, "randomise must be finite and at least 0 and at most 0.5"),
+        ({"window": 26.0}, "window must be finite and at least 0.1 and at most 25 s"),
     ],
 )
 def test_impossible_settings_are_refused(change, message):

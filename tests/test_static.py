@@ -570,7 +570,7 @@ def test_bad_arguments_are_refused(change, message):
         ({"rotation": np.eye(2)}, r"rotation must be finite numbers of shape \(3, 3\)"),
         ({"rotation": -np.eye(3)}, "rotation must be a 3 x 3 rotation matrix"),
         ({"offset": (0.0, 0.0)}, r"offset must be finite numbers of shape \(3,\)"),
-        ({"mass": -1.0}, r"mass must be finite and at least 0 kg, got -1\.0"),
+        ({"mass": -1.0}, r"mass must be finite and at least 0, got -1\.0"),
         ({"centre": (0.0, 0.0, math.nan)}, "centre must be finite, got"),
     ],
 )

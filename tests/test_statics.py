@@ -11,6 +11,7 @@ from scipy.optimize import brentq, root
 
 import tca_mj.tca.laws.castigliano as castigliano
 import tca_mj.tca.laws.coil as laws
+import tca_mj.tca.laws.roots as roots
 from tca_mj.tca import (
     CATALOGUE,
     FREE_STROKE_CREPT,
@@ -373,7 +374,7 @@ def test_brackets_alone_find_the_same(kind, monkeypatch):
     np.testing.assert_allclose(hanging_length(spec, temperature, load, **kind), length, rtol=1e-10)
     force, _ = tension(spec, length, temperature, **kind)
     np.testing.assert_allclose(force, np.broadcast_to(load, (3, 3)), atol=1e-9)
-    monkeypatch.setattr(laws, "_BRACKETED_STEPS", 1)
+    monkeypatch.setattr(roots, "_STEPS", 1)
     with pytest.raises(ArithmeticError) as caught:
         hanging_length(spec, temperature, load, **kind)
     assert caught.value.residual > 0.0

@@ -3,16 +3,6 @@
 ``gait`` and ``network`` act, ``files`` keeps them, ``actors`` finds them by name.
 """
 
-from tca_mj.agents.policies.files import (
-    Origin,
-    Policy,
-    SavedPolicy,
-    find,
-    load_policy,
-    require_arguments,
-    shipped,
-)
+from tca_mj.agents.policies.files import Origin, Policy, SavedPolicy, load_policy, shipped
 
-__all__ = [
-    "Origin", "Policy", "SavedPolicy", "find", "load_policy", "require_arguments", "shipped",
-]  # fmt: skip
+__all__ = ["Origin", "Policy", "SavedPolicy", "load_policy", "shipped"]

@@ -1,6 +1,7 @@
 """Who acts in a task, by name: its script, nobody, chance, or a saved policy."""
 
-from dataclasses import dataclass, field
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -8,59 +9,34 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tca_mj.agents.policies import Policy, SavedPolicy, find, load_policy, require_arguments
-from tca_mj.registry import task_class
+from tca_mj.agents.policies import Policy, SavedPolicy, load_policy
+from tca_mj.agents.policies.files import find, require_arguments
+from tca_mj.agents.policies.gait import GaitPolicy
+from tca_mj.control import Gait
+from tca_mj.registry import make, task_class
 
 NAMES = ("scripted", "off", "random")
-
-@dataclass(slots=True)
-class Still:
-    """No power, and everything else in the middle of its range.
-
-    Attributes:
-        action: The action, always the same.
-    """
-
-    action: NDArray[np.float32]
-
-    @property
-    def phase(self) -> str:
-        return "off"
-
-    def reset(self) -> None:
-        """Nothing is remembered."""
-
-    def act(self, observation: NDArray[np.float32]) -> NDArray[np.float32]:
-        """The action, whatever is seen."""
-        return self.action.copy()
+TROT = (0.5, 0.0, 0.0, 0.5)  # offsets of four legs, diagonal ones together
 
 
 @dataclass(slots=True)
-class Chance:
-    """Actions drawn evenly from the whole space.
+class Blind:
+    """Acts without a look at what is seen.
 
     Attributes:
-        size: Length of an action.
-        seed: Seed of the first episode; every further episode goes on drawing.
+        phase: What it is called.
+        draw: Gives the next action.
     """
 
-    size: int
-    seed: int = 0
-    _random: np.random.Generator = field(init=False)
-
-    def __post_init__(self) -> None:
-        self._random = np.random.default_rng(self.seed)
-
-    @property
-    def phase(self) -> str:
-        return "random"
+    phase: str
+    draw: Callable[[], NDArray[np.float32]]
 
     def reset(self) -> None:
-        """Nothing is remembered."""
+        """Nothing is remembered; what is random goes on."""
 
     def act(self, observation: NDArray[np.float32]) -> NDArray[np.float32]:
-        """An action, whatever is seen."""
-        return self._random.uniform(-1.0, 1.0, self.size).astype(np.float32)
+        """The next action, whatever is seen."""
+        return self.draw()
 
 
 def actor(name: str | Path, env: Any, *, seed: int = 0) -> Policy:
@@ -81,8 +57,9 @@ def actor(name: str | Path, env: Any, *, seed: int = 0) -> Policy:
     if name == "scripted":
         return scripted(env)
     if name == "random":
-        return Chance(env.action_space.shape[0], seed)
-    return Still(env.unwrapped.action.still)
+        uniform, size = np.random.default_rng(seed).uniform, env.action_space.shape
+        return Blind("random", lambda: uniform(-1.0, 1.0, size).astype(np.float32))
+    return Blind("off", env.unwrapped.action.still.copy)
 
 
 def arguments_of(name: str | Path, task: str) -> dict[str, Any]:
@@ -115,11 +92,37 @@ def scripted(env: Any) -> Policy:
     return policy
 
 
+def first_gait(task: str, start: str) -> tuple[Gait, tuple[float, ...]]:
+    """The gait from which something starts, and its steering per leg [K/rad].
+
+    Args:
+        task: Gymnasium id.
+        start: ``scripted``; ``trot``, which is the same with diagonal legs together, half a cycle
+            after the others; or a policy's file or name.
+
+    Raises:
+        FileNotFoundError: If ``start`` is no policy.
+        ValueError: If it is a policy without a gait.
+    """
+    if start not in ("scripted", "trot"):
+        saved = SavedPolicy.read(find(start))
+        if saved.gait is None:
+            raise ValueError(f"start must have a gait, {start} is a {saved.kind}")
+        return saved.gait, saved.steering
+    env = make(task, disable_env_checker=True, **arguments_of("scripted", task))
+    script = scripted(env)
+    env.close()
+    if not isinstance(script, GaitPolicy):
+        raise ValueError(f"start must be a policy with a gait: the script of {task} has none")
+    gait = replace(script.gait, offset=TROT) if start == "trot" else script.gait
+    return gait, tuple(np.broadcast_to(script.steering, gait.legs).tolist())
+
+
 def best_of(name: str | Path) -> str | Path:
     """The file of the best policy, if ``name`` is the folder of a training run; else ``name``."""
     if not Path(name).is_dir():
         return name
-    for file in ("best.json", "best.npz"):
-        if (Path(name) / file).is_file():
-            return Path(name) / file
-    raise FileNotFoundError(f"no best.json and no best.npz in {name}")
+    found = [path for path in map(Path(name).joinpath, ("best.json", "best.npz")) if path.is_file()]
+    if not found:
+        raise FileNotFoundError(f"no best.json and no best.npz in {name}")
+    return found[0]

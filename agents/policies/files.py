@@ -23,6 +23,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from tca_mj.agents.output import write_json
 from tca_mj.agents.policies.gait import GaitPolicy
 from tca_mj.agents.policies.network import Network
 from tca_mj.control import Gait
@@ -131,13 +132,12 @@ class SavedPolicy:
         if self.gait is not None:
             header |= {"gait": asdict(self.gait), "steering": self.steering}
         if self.network is None:
-            text = json.dumps(header, indent=2, ensure_ascii=False) + "\n"
-            return write_whole(path, text.encode())
+            return write_json(path, header)
         network = self.network
-        arrays: dict[str, Any] = {"mean": network.mean, "var": network.var}
         names = ("clip", "epsilon", "activation", "squash")
         header |= {"network": {name: getattr(network, name) for name in names}}
         header |= {"bound": self.bound} if self.kind == "residual" else {}
+        arrays: dict[str, Any] = {"mean": network.mean, "var": network.var}
         for i, (weight, bias) in enumerate(zip(network.weights, network.biases, strict=True)):
             arrays |= {f"weight{i}": weight, f"bias{i}": bias}
         memory = io.BytesIO()
@@ -152,20 +152,18 @@ class SavedPolicy:
             FileNotFoundError: If there is none.
             ValueError: If it is not a policy's, or of a newer format.
         """
-        path = Path(path)
-        arrays: dict[str, NDArray[Any]] = {}
+        content = Path(path).read_bytes()
         try:
-            if path.suffix == ".npz":
-                with np.load(path, allow_pickle=False) as archive:
-                    arrays = dict(archive)
-                header = json.loads(str(arrays.pop("header")))
-            else:
-                header = json.loads(path.read_text(encoding="utf-8"))
+            arrays: dict[str, NDArray[Any]] = {}
+            if Path(path).suffix == ".npz":
+                arrays = dict(np.load(io.BytesIO(content), allow_pickle=False))
+                content = str(arrays.pop("header")).encode()
+            header = json.loads(content)
             if header["format"] != FORMAT:
                 raise ValueError(f"format must be {FORMAT}, got {header['format']}")
             if header["kind"] not in KINDS:
                 raise ValueError(f"kind must be one of {list(KINDS)}, got {header['kind']!r}")
-            found = cls(
+            return cls(
                 task=header["task"],
                 origin=Origin(**header["origin"]),
                 gait=_gait(header["gait"]) if header["kind"] != "network" else None,
@@ -174,11 +172,8 @@ class SavedPolicy:
                 bound=header.get("bound", 0.0),
                 arguments=header.get("arguments", {"action": "power"}),
             )
-        except FileNotFoundError:
-            raise
         except Exception as error:
             raise ValueError(f"{path} is no policy: {type(error).__name__}: {error}") from error
-        return found
 
     def make(self, env: Any) -> "Policy":
         """The policy, ready for an episode in an environment; errors as ``GaitPolicy.in_task``."""
@@ -194,10 +189,7 @@ class NetworkPolicy:
     """A network that acts on what it sees."""
 
     network: Network
-
-    @property
-    def phase(self) -> str:
-        return "network"
+    phase = "network"
 
     def reset(self) -> None:
         """Nothing is remembered."""
@@ -220,10 +212,7 @@ class ResidualPolicy:
     walker: GaitPolicy
     network: Network
     bound: float
-
-    @property
-    def phase(self) -> str:
-        return "residual"
+    phase = "residual"
 
     def reset(self) -> None:
         """Starts the gait anew."""

@@ -1,6 +1,6 @@
 """A gait on feedback of the temperatures: an observation in, an action out."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -11,7 +11,7 @@ from tca_mj.envs.table import Table
 from tca_mj.tca import HeatSpec
 
 
-@dataclass(slots=True, kw_only=True)
+@dataclass(kw_only=True)
 class GaitPolicy:
     """The power that makes the TCAs of legs as hot as a gait says, steered to a direction.
 
@@ -39,17 +39,14 @@ class GaitPolicy:
     hottest: float
     control_period: float
     time: float = 0.0
-    _thermostat: Thermostat = field(init=False)
-    _left: NDArray[np.float64] = field(init=False)
+    phase = "gait"
 
     def __post_init__(self) -> None:
         self._thermostat = Thermostat(heat=self.heat, max_power=self.max_power)
         self._left = np.array([1.0, 0.0] * (self.gait.legs // 2), dtype=np.float64)
 
     @classmethod
-    def in_task(
-        cls, env: Any, gait: Gait, steering: float | tuple[float, ...]
-    ) -> "GaitPolicy":
+    def in_task(cls, env: Any, gait: Gait, steering: float | tuple[float, ...]) -> "GaitPolicy":
         """A gait in an environment.
 
         Raises:
@@ -62,20 +59,18 @@ class GaitPolicy:
         if task.legs != gait.legs:
             raise ValueError(f"gait must have {task.legs} legs, got {gait.legs}")
         n = task.action.size
-        return cls(
-            gait=gait,
-            steering=steering,
-            seen=task.observation,
-            heat=HeatSpec(capacity=task.heat.capacity[:n], loss=task.heat.loss[:n]),
-            max_power=task.max_power,
-            hottest=task.hot_temperature,
-            control_period=task.control_period,
-        )
+        heat = HeatSpec(capacity=task.heat.capacity[:n], loss=task.heat.loss[:n])
+        return cls.told_of(task, task.observation, heat, gait, steering)
 
-    @property
-    def phase(self) -> str:
-        """What it does: a gait has no phases that are worth a name."""
-        return "gait"
+    @classmethod
+    def told_of(
+        cls, task: Any, seen: Table, heat: HeatSpec, gait: Gait, steering: float | tuple[float, ...]
+    ) -> "GaitPolicy":
+        """A gait with the limits and the control period of a task, or of a class of tasks."""
+        return cls(
+            gait=gait, steering=steering, seen=seen, heat=heat, max_power=task.max_power,
+            hottest=task.hot_temperature, control_period=task.control_period,
+        )  # fmt: skip
 
     @property
     def cycle(self) -> float:
@@ -105,8 +100,7 @@ class GaitPolicy:
         target = (target - (np.abs(weaker) * side)[:, None]).ravel()
         limit = np.maximum(target, self.hottest)
         self.time += self.control_period
-        power = self._thermostat.power(
-            rows["TCA temperature"], np.minimum(target + correction, limit)
-        )
+        wanted = np.minimum(target + correction, limit)
+        power = self._thermostat.power(rows["TCA temperature"], wanted)
         action = 2.0 * power / self.max_power - 1.0
         return np.clip(action, -1.0, 1.0).astype(np.float32)

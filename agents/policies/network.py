@@ -1,17 +1,18 @@
 """A learned network as plain numbers: from an observation to an action, by NumPy alone."""
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from tca_mj.checks import Checked, Positive, within
 
 ACTIVATIONS = ("tanh", "relu")
 SQUASHES = ("clip", "tanh")
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
-class Network:
+class Network(Checked):
     """A multi-layer perceptron behind a normalisation, without noise.
 
     The observation x becomes clip((x - mean)/sqrt(var + epsilon), ±clip), passes through the
@@ -35,18 +36,16 @@ class Network:
     biases: tuple[NDArray[np.float32], ...]
     mean: NDArray[np.float64]
     var: NDArray[np.float64]
-    clip: float = 10.0
-    epsilon: float = 1e-8
+    clip: Positive = 10.0
+    epsilon: Positive = 1e-8
     activation: str = "tanh"
     squash: str = "clip"
 
     def __post_init__(self) -> None:
+        Checked.__post_init__(self)
         for name, known in (("activation", ACTIVATIONS), ("squash", SQUASHES)):
             if getattr(self, name) not in known:
                 raise ValueError(f"{name} must be one of {known}, got {getattr(self, name)!r}")
-        for name in ("clip", "epsilon"):
-            if not 0.0 < getattr(self, name) < np.inf:
-                raise ValueError(f"{name} must be finite and above 0, got {getattr(self, name)}")
         if not self.weights or len(self.weights) != len(self.biases):
             raise ValueError(
                 f"biases must be as many as weights and at least 1, got {len(self.biases)}"
@@ -61,11 +60,10 @@ class Network:
                     f"weights[{i}] must have the shape {(*bias.shape, *width)}, got {weight.shape}"
                 )
             width = bias.shape
-        numbers: tuple[NDArray[Any], ...] = (*self.weights, *self.biases, self.mean)
-        if not all(np.isfinite(a).all() for a in numbers):
-            raise ValueError("weights, biases and mean must be finite numbers")
-        if not (np.isfinite(self.var) & (np.asarray(self.var) >= 0.0)).all():
-            raise ValueError(f"var must be finite and at least 0, got {self.var}")
+        for array in (*self.weights, *self.biases):
+            within("weights and biases", array)
+        within("mean", self.mean)
+        within("var", self.var, at_least=0.0)
 
     @property
     def inputs(self) -> int:

@@ -4,17 +4,17 @@
 lift, turn back, bend towards the cup, release.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tca_mj.envs.arm import ACTION, OBSERVATION, ArmPickPlace
+from tca_mj.envs.arm import OBSERVATION, ArmPickPlace
 from tca_mj.robots.arm import ArmSpec, arm
-from tca_mj.tca import TcaSpec
 from tca_mj.tca.spec import heat_of
+
+Array = NDArray[np.float64]
 
 PHASES = ("align", "open", "lower", "pinch", "lift", "turn back", "bend", "release", "done")
 
@@ -84,7 +84,7 @@ class PickAndPlaceGains:
     phase_limit: float = 40.0
 
 
-@dataclass(slots=True)
+@dataclass
 class PickAndPlace:
     """The scripted policy of ``TCA/ArmPickPlace-v0``: an observation in, an action out.
 
@@ -98,26 +98,18 @@ class PickAndPlace:
 
     arm_spec: ArmSpec = field(default_factory=ArmSpec)
     gains: PickAndPlaceGains = field(default_factory=PickAndPlaceGains)
-    phase: str = "align"
-    since: float = 0.0
-    tries: int = 1
-    _bend: NDArray[np.float64] = field(default_factory=lambda: np.zeros(2))
-    _calm: float = 0.0
-    _opening: float = 0.0
-    _height: float = 0.0
-    _mean: NDArray[np.float64] | None = None
-    _heat: "_Heaters" = field(init=False)
 
     def __post_init__(self) -> None:
-        self._heat = _Heaters([tca.spec for tca in arm(self.arm_spec).tcas])
+        self._heat = heat_of([tca.spec for tca in arm(self.arm_spec).tcas])
+        self.reset()
 
     def reset(self) -> None:
         """Starts anew."""
         self.phase, self.since, self.tries = "align", 0.0, 1
         self._bend = np.zeros(2)
         self._calm = self._opening = self._height = 0.0
-        self._mean = None
-        self._heat.reset()
+        self._mean: Array | None = None
+        self._body = np.array(self._heat.ambient)  # what the TCAs lie in: not seen, but followed
 
     def act(self, observation: NDArray[np.float32]) -> NDArray[np.float32]:
         """The action for the next control period, shape (6,)."""
@@ -152,7 +144,7 @@ class PickAndPlace:
                 return "pinch"
             case "pinch" if (
                 self._calm > gains.calm
-                or seen.temperature[_GRIPPER] < self._heat.body[_GRIPPER] + gains.cool
+                or seen.temperature[_GRIPPER] < self._body[_GRIPPER] + gains.cool
             ):
                 return "lift"
             case "lift" if self.since > 1.0 and seen.object[2] < seen.gripper[2] - gains.slipped:
@@ -174,36 +166,35 @@ class PickAndPlace:
     def _command(self, seen: "_Seen") -> NDArray[np.float32]:
         gains, phase = self.gains, self.phase
         target = np.full(5, -np.inf)  # wanted temperatures [°C]; below ambient means off
-
+        error = np.zeros(2)
         if phase in ("align", "open", "lower"):
-            target[_BENDING] = self._steer(seen, seen.object[:2] - seen.gripper[:2])
+            error = seen.object[:2] - seen.gripper[:2]
             target[_WRIST] = seen.temperature[_WRIST] + 0.5 * gains.wrist_slope * seen.misaligned
-        elif phase == "bend":
-            target[_BENDING] = self._steer(seen, seen.cup[:2] - seen.object[:2])
-        elif phase in ("release", "done"):
-            target[_BENDING] = self._steer(seen, np.zeros(2))
         elif phase == "pinch":
-            target[_BENDING] = self._steer(seen, np.zeros(2))
             target[_WRIST] = seen.temperature[_WRIST]
-        else:  # lift and turn back: straight again
-            self._bend *= 0.9
-            target[_BENDING] = self._steer(seen, np.zeros(2))
+        elif phase in ("lift", "turn back"):
+            self._bend *= 0.9  # straight again
+        elif phase == "bend":
+            error = seen.cup[:2] - seen.object[:2]
+        target[_BENDING] = self._steer(seen, error)
         if phase in ("open", "lower", "release"):
             wanted = seen.width + gains.clearance * (1.5 if phase == "release" else 1.0)
             target[_GRIPPER] = seen.temperature[_GRIPPER] + 0.5 * gains.opening_slope * (
                 wanted - seen.opening
             )
-        power = self._heat.power(
-            seen.temperature, np.minimum(target, gains.hottest), gains.settling
-        )
-        action = np.empty(ACTION.size, dtype=np.float32)
-        action[:5] = np.clip(2.0 * power / ArmPickPlace.max_power - 1.0, -1.0, 1.0)
-        action[5] = np.clip(self._climb(seen) / self.arm_spec.speed, -1.0, 1.0)
-        return action
+        power = self._power(seen.temperature, np.minimum(target, gains.hottest))
+        climb = self._climb(seen) / self.arm_spec.speed
+        action = np.append(2.0 * power / ArmPickPlace.max_power - 1.0, climb)
+        return np.clip(action, -1.0, 1.0).astype(np.float32)
 
-    def _steer(
-        self, seen: "_Seen", error: NDArray[np.float64]
-    ) -> NDArray[np.float64]:
+    def _power(self, now: Array, wanted: Array) -> Array:
+        """What brings the TCAs to a temperature, shape (n,) [W]; -inf is off."""
+        heat = self._heat
+        hold = heat.keeping(np.maximum(np.minimum(now, wanted), self._body), self._body)
+        self._body = heat.body_after(self._body, now, _DT)
+        return np.maximum(hold + heat.capacity * (wanted - now) / self.gains.settling, 0.0)
+
+    def _steer(self, seen: "_Seen", error: Array) -> Array:
         """Temperatures of the three bending TCAs that take the gripper along ``error`` [m].
 
         Proportional and integral; a TCA bends the arm to its own side.
@@ -245,27 +236,6 @@ _ANGLES = -2.0 * np.pi / 3.0 * np.arange(3)
 _SIDES = np.stack([np.cos(_ANGLES), np.sin(_ANGLES)], axis=-1)
 
 
-class _Heaters:
-    """Power that brings TCAs of known heat capacity and loss to wanted temperatures."""
-
-    def __init__(self, specs: Sequence[TcaSpec]) -> None:
-        self.heat = heat_of(specs)
-        self.reset()
-
-    def reset(self) -> None:
-        """All is cold."""
-        self.body = np.array(self.heat.ambient)  # what the TCAs lie in is not seen, but followed
-
-    def power(
-        self, temperature: NDArray[np.float64], wanted: NDArray[np.float64], settling: float
-    ) -> NDArray[np.float64]:
-        """Not negative, shape (n,) [W]; a wanted temperature of -inf is off."""
-        heat = self.heat
-        hold = heat.keeping(np.maximum(np.minimum(temperature, wanted), self.body), self.body)
-        self.body = heat.body_after(self.body, temperature, _DT)
-        return np.maximum(hold + heat.capacity * (wanted - temperature) / settling, 0.0)
-
-
 class _Seen:
     """An observation, taken apart."""
 
@@ -274,7 +244,6 @@ class _Seen:
     def __init__(self, observation: NDArray[np.float32]) -> None:
         rows = OBSERVATION.read(observation.astype(np.float64))
         self.temperature = rows["TCA temperature"]
-        self.tension = rows["TCA tension"]
         self.opening = float(rows["gripper opening"][0])
         self.width = float(rows["object width"][0])
         self.gripper = rows["gripper position"]
@@ -282,12 +251,15 @@ class _Seen:
         self.object = rows["object position"]
         self.cup = rows["cup position"]
         # The fingers close along the gripper's x axis; neutral is the world's x axis.
-        w, x, y, z = rows["gripper orientation"]
-        self.yaw = float(np.arctan2(2.0 * (x * y + w * z), 1.0 - 2.0 * (y * y + z * z)))
-        w, x, y, z = rows["object orientation"]
-        long_side = float(np.arctan2(2.0 * (x * y + w * z), 1.0 - 2.0 * (y * y + z * z)))
+        self.yaw = _yaw(rows["gripper orientation"])
+        long_side = _yaw(rows["object orientation"])
         # The long side has to lie across the fingers; half turns do not matter.
         self.misaligned = (long_side - np.pi / 2.0 - self.yaw + np.pi / 2.0) % np.pi - np.pi / 2.0
+
+
+def _yaw(orientation: Array) -> float:
+    w, x, y, z = orientation
+    return float(np.arctan2(2.0 * (x * y + w * z), 1.0 - 2.0 * (y * y + z * z)))
 
 
 def scripted(task: Any) -> PickAndPlace:

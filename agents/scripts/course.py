@@ -54,17 +54,14 @@ class Go:
             on.
         until: Where the stage ends, along x [m].
         patience: Time without headway after which the stage ends wherever the body is [s].
-        steers: Deviation of the heading up to which nothing is done; beyond it the legs of one side
-            become weaker. None: never [rad].
-        pushes: Which legs follow the gait; the others are cold.
+        steers: Whether the legs of one side become weaker where the heading is off.
     """
 
     name: str
     gait: Gait | tuple[Gait, ...]
     until: float
     patience: float = math.inf
-    steers: float | None = None
-    pushes: tuple[bool, bool, bool, bool] = (True,) * 4
+    steers: bool = False
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -91,33 +88,25 @@ class Bend:
 
 def stages(places: Places) -> tuple[Go | Bend, ...]:
     """The course, stage by stage."""
-    station = places.leg_station
-    walking = np.radians(95.0)
+    station, edge, end = places.leg_station, places.first_edge, places.beam_end
+    walking, wide = np.radians(95.0), np.radians(115.0)
     return (
-        Go(name="crawl", gait=CRAWL, until=places.stand, steers=0.0),
+        Go(name="crawl", gait=CRAWL, until=places.stand, steers=True),
         Bend(name="stand up", angle=walking, steps=WALK),
         # On until the front feet have left the desk wherever they swing; then the rear ones push,
         # until the roots of their legs have left it as well.
-        Go(name="walk", gait=WALK, until=places.first_edge - station + 0.019, steers=0.0),
-        Go(
-            name="mount", gait=PUSH, until=places.first_edge + station + 0.004, patience=25.0,
-            steers=0.0,
-        ),  # fmt: skip
+        Go(name="walk", gait=WALK, until=edge - station + 0.019, steers=True),
+        Go(name="mount", gait=PUSH, until=edge + station + 0.004, patience=25.0, steers=True),
         Bend(name="clamp", angle=np.radians(213.0), reaching=True),
-        Go(name="shimmy", gait=HURRY, until=places.beam_end - 0.005, patience=200.0),
+        Go(name="shimmy", gait=HURRY, until=end - 0.005, patience=200.0),
         # On until the rear spine has left the beam; the front legs clamp its lower end by then.
-        Go(
-            name="step off", gait=HURRY, until=places.beam_end + station - 0.015, patience=60.0,
-        ),  # fmt: skip
+        Go(name="step off", gait=HURRY, until=end + station - 0.015, patience=60.0),
         # As wide each time as curled legs can open it; between, the legs stretch.
         *(
-            Bend(
-                name="open", angle=np.radians(angle), steps=STEP, braced=True,
-                enough=np.radians(115.0),
-            )
+            Bend(name="open", angle=np.radians(angle), steps=STEP, braced=True, enough=wide)
             for angle in (165.0, 130.0, 97.0, 97.0, 97.0)
-        ),  # fmt: skip
-        Go(name="walk on", gait=WALK, until=places.target, steers=0.0),
+        ),
+        Go(name="walk on", gait=WALK, until=places.target, steers=True),
         Bend(name="lie down", angle=None, steps=STEP),
     )
 
@@ -208,14 +197,12 @@ class CourseWalker:
         gaits = stage.gait if isinstance(stage.gait, tuple) else (stage.gait,)
         gait = gaits[self._choice % len(gaits)]
         legs = gait.temperature(self._time / gait.period).reshape(4, 3)
-        if stage.steers is not None:
+        if stage.steers:
             w, _, _, z = seen["orientation"]
             away = 2.0 * np.arctan2(z, w) + 3.0 * seen["position"][1]
-            away -= np.clip(away, -stage.steers, stage.steers)
             weaker = np.clip(600.0 * away, -80.0, 80.0)
             legs[[0, 2]] -= max(-weaker, 0.0)
             legs[[1, 3]] -= max(weaker, 0.0)
-        legs[~np.array(stage.pushes)] = _OFF
         return legs
 
     def _bend(self, stage: Bend, seen: dict[str, Array]) -> tuple[Array, float, Array]:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from tca_mj.control.morph import ClosedLoop, Measurement, MorphSequence, MorphState
 from tca_mj.control.pi import PiSpec
-from tca_mj.envs.morph import ACTION, OBSERVATION, MorphModule
+from tca_mj.envs.morph import OBSERVATION, MorphModule
 from tca_mj.modules.morphing import MorphingSpec
 from tca_mj.smp.lumped import LumpedModule
 from tca_mj.tca.sensing.wire import DisplacementFit, fit_displacement
@@ -47,7 +47,7 @@ def _lumped(spec: MorphingSpec) -> LumpedModule:
     return LumpedModule(spec.spine, spec.heater, spec.sheathed)
 
 
-@dataclass(slots=True)
+@dataclass
 class MorphPolicy:
     """Soften, morph, hold, harden, release: an observation in, an action out.
 
@@ -63,9 +63,7 @@ class MorphPolicy:
 
     module_spec: MorphingSpec = field(default_factory=MorphingSpec)
     gains: PiSpec = GAINS
-    sequence: MorphSequence = field(init=False)
     progress: MorphState | None = None
-    _fit: DisplacementFit = field(init=False)
 
     def __post_init__(self) -> None:
         self._fit = calibrate(self.module_spec)
@@ -94,11 +92,9 @@ class MorphPolicy:
             self.progress = self.sequence.start(float(rows["commanded angle"][0]))
         seen = Measurement(float(rows["spine temperature"][0]), float(rows["TCA resistance"][0]))
         self.progress, command = self.sequence.step(self.progress, seen, MorphModule.control_period)
-        action = np.empty(ACTION.size, dtype=np.float32)
-        action[0] = 2.0 * command.heater_voltage / MorphModule.max_voltage - 1.0
-        action[1] = 2.0 * command.tca_power / MorphModule.max_power - 1.0
-        action[2] = 1.0 if command.fan else -1.0
-        return action
+        heater = 2.0 * command.heater_voltage / MorphModule.max_voltage - 1.0
+        tca = 2.0 * command.tca_power / MorphModule.max_power - 1.0
+        return np.array([heater, tca, 1.0 if command.fan else -1.0], dtype=np.float32)
 
 
 def scripted(task: Any) -> MorphPolicy:

@@ -7,12 +7,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tca_mj.control import Thermostat
-from tca_mj.envs.hanging import TCAS, StaticTip
+from tca_mj.envs.hanging import StaticTip
 from tca_mj.envs.reach import ACTION, OBSERVATION, BendReach
 from tca_mj.modules.bending import BendingSpec
 
 
-@dataclass(slots=True)
+@dataclass
 class ReachPolicy:
     """Temperatures from a model at rest, corrected by where the tip is: observation in, action out.
 
@@ -33,47 +33,35 @@ class ReachPolicy:
     averaging: float = 1.0
     near: float = 10.0
     hottest: float = BendReach.hot_temperature - 5.0
-    _static: StaticTip = field(init=False)
-    _thermostat: Thermostat = field(init=False)
-    _target: NDArray[np.float64] | None = None
-    _rest: NDArray[np.float64] = field(default_factory=lambda: np.zeros(3))
-    _slope: NDArray[np.float64] = field(default_factory=lambda: np.eye(3))
-    _off: NDArray[np.float64] = field(default_factory=lambda: np.zeros(3))
-    _body: NDArray[np.float64] = field(default_factory=lambda: np.zeros(TCAS))
+    phase = "reach"
     _dt = BendReach.control_period
 
     def __post_init__(self) -> None:
         self._static = StaticTip(self.module_spec)
-        heat = self._static.sim.bank.heat
-        self._thermostat = Thermostat(heat=heat, max_power=BendReach.max_power)
-
-    @property
-    def phase(self) -> str:
-        """What it does: always the same."""
-        return "reach"
+        self._heat = self._static.sim.bank.heat
+        self._thermostat = Thermostat(heat=self._heat, max_power=BendReach.max_power)
+        self.reset()
 
     def reset(self) -> None:
         """Starts anew."""
-        self._target = None
+        self._target: NDArray[np.float64] | None = None
         self._off = np.zeros(3)
+        self._body = np.array(self._heat.ambient)  # what the TCAs lie in: not seen, but followed
 
     def act(self, observation: NDArray[np.float32]) -> NDArray[np.float32]:
         """The action for the next control period, shape (3,)."""
         rows = OBSERVATION.read(observation.astype(np.float64))
         target, temperature = rows["target position"], rows["TCA temperature"]
-        if self._target is None:  # an episode begins
-            self._body = np.full(TCAS, self._static.sim.bank.heat.ambient)
         if self._target is None or (target != self._target).any():
             self._target = target
             self._rest, self._slope, _ = self._static.inverse(target, BendReach.hottest_target)
-        ambient = self._static.sim.bank.heat.ambient
         aim = self._rest - np.linalg.solve(self._slope, self._off)
-        aim = np.clip(aim, ambient, self.hottest)
+        aim = np.clip(aim, self._heat.ambient, self.hottest)
         if np.abs(temperature - aim).max() < self.near:
             missed = rows["tip position"] - target
             self._off += self._dt / self.averaging * missed
         power = self._thermostat.power(temperature, aim, self._body)
-        self._body = self._thermostat.heat.body_after(self._body, temperature, self._dt)
+        self._body = self._heat.body_after(self._body, temperature, self._dt)
         action = 2.0 * power / BendReach.max_power - 1.0
         return np.clip(action, -1.0, 1.0).astype(ACTION.space.dtype)
 

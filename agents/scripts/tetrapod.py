@@ -8,43 +8,29 @@ all legs, 120 to 216 gaits of which each went for half a minute; the walk's on f
 from types import MappingProxyType
 from typing import Any
 
-import numpy as np
-
 from tca_mj.agents.policies.gait import GaitPolicy
 from tca_mj.control import Gait
 from tca_mj.envs.stance import LEG_TCAS
 from tca_mj.envs.tetrapod import OBSERVATION, TetrapodGait
 from tca_mj.robots.tetrapod import TetrapodSpec, tetrapod
-from tca_mj.tca import HeatSpec
+from tca_mj.tca.spec import heat_of
 
 CRAWL = Gait(
-    period=2.9,
-    offset=(0.0, 0.0, 0.0, 0.0),
-    start=(0.0, 0.27, 0.63),
-    duty=(0.65, 0.42, 0.49),
-    hot=(169.0, 168.0, 168.0),
-    warm=(55.0, 57.0, 53.0),
-)
+    period=2.9, offset=(0.0,) * 4, start=(0.0, 0.27, 0.63), duty=(0.65, 0.42, 0.49),
+    hot=(169.0, 168.0, 168.0), warm=(55.0, 57.0, 53.0),
+)  # fmt: skip
 """All four feet run round a loop together, like the flippers of a sea turtle."""
 
 WALK = Gait(
-    period=3.2,
-    offset=(0.75, 0.25, 0.0, 0.5),
-    start=(0.09, 0.21, 0.52),
-    duty=(0.37, 0.33, 0.44),
-    hot=(167.0, 169.0, 170.0),
-    warm=(81.0, 82.0, 57.0),
-)
+    period=3.2, offset=(0.75, 0.25, 0.0, 0.5), start=(0.09, 0.21, 0.52), duty=(0.37, 0.33, 0.44),
+    hot=(167.0, 169.0, 170.0), warm=(81.0, 82.0, 57.0),
+)  # fmt: skip
 """An amble: rear left, front left, rear right, front right lift one after the other."""
 
 SHIMMY = Gait(
-    period=6.9,
-    offset=(0.0, 0.0, 0.5, 0.5),
-    start=(0.02, 0.15, 0.46),
-    duty=(0.36, 0.36, 0.47),
-    hot=(162.0, 170.0, 165.0),
-    warm=(43.0, 28.0, 39.0),
-)
+    period=6.9, offset=(0.0, 0.0, 0.5, 0.5), start=(0.02, 0.15, 0.46), duty=(0.36, 0.36, 0.47),
+    hot=(162.0, 170.0, 165.0), warm=(43.0, 28.0, 39.0),
+)  # fmt: skip
 """Front and rear pair clamp the beam by turns, like a caterpillar."""
 
 GAITS = MappingProxyType({"crawl": CRAWL, "walk": WALK, "shimmy": SHIMMY})
@@ -65,20 +51,8 @@ def gait_policy(gait: str, robot: TetrapodSpec | None = None) -> GaitPolicy:
     """
     if gait not in GAITS:
         raise ValueError(f"gait must be one of {list(GAITS)}, got {gait!r}")
-    heats = [tca.spec.heat for tca in tetrapod(robot or TetrapodSpec()).tcas[:LEG_TCAS]]
-    heat = HeatSpec(
-        capacity=np.array([heat.capacity for heat in heats]),
-        loss=np.array([heat.loss for heat in heats]),
-    )
-    return GaitPolicy(
-        gait=GAITS[gait],
-        steering=STEERING[gait],
-        seen=OBSERVATION,
-        heat=heat,
-        max_power=TetrapodGait.max_power,
-        hottest=TetrapodGait.hot_temperature,
-        control_period=TetrapodGait.control_period,
-    )
+    heat = heat_of([tca.spec for tca in tetrapod(robot or TetrapodSpec()).tcas[:LEG_TCAS]])
+    return GaitPolicy.told_of(TetrapodGait, OBSERVATION, heat, GAITS[gait], STEERING[gait])
 
 
 def scripted(task: Any) -> GaitPolicy:

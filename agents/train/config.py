@@ -2,9 +2,10 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from functools import partial
+from typing import Annotated, Any
 
-from tca_mj.checks import require_count, require_positive
+from tca_mj.checks import Checked, Count, Finite, Positive, number
 from tca_mj.registry import task_class
 
 ALGORITHMS = ("ppo", "sac", "td3")
@@ -12,8 +13,17 @@ ALGORITHMS = ("ppo", "sac", "td3")
 _STEPS = 500_000  # of a run if neither the caller nor the task says: a guess
 
 
+def _widths(name: str, value: tuple[int, ...]) -> None:
+    if not value or min(value) < 1:
+        raise ValueError(f"{name} must be widths of at least 1, got {value}")
+
+
+Discount = Annotated[float, partial(number, above=0.0, at_most=1.0)]
+Widths = Annotated[tuple[int, ...], _widths]
+
+
 @dataclass(frozen=True, kw_only=True, slots=True)
-class OnPolicy:
+class OnPolicy(Checked):
     """Settings of PPO, under the names of Stable-Baselines3.
 
     Attributes:
@@ -29,25 +39,20 @@ class OnPolicy:
         hidden: Widths of the hidden layers of actor and critic, with tanh.
     """
 
-    n_steps: int = 256
-    batch_size: int = 256
-    n_epochs: int = 10
-    learning_rate: float = 3e-4
-    gamma: float = 0.99
-    gae_lambda: float = 0.95
-    clip_range: float = 0.2
-    ent_coef: float = 0.0
-    log_std_init: float = -0.5
-    hidden: tuple[int, ...] = (64, 64)
-
-    def __post_init__(self) -> None:
-        require_count(n_steps=self.n_steps, batch_size=self.batch_size, n_epochs=self.n_epochs)
-        require_positive(learning_rate=self.learning_rate, clip_range=self.clip_range)
-        _require(self)
+    n_steps: Count = 256
+    batch_size: Count = 256
+    n_epochs: Count = 10
+    learning_rate: Positive = 3e-4
+    gamma: Discount = 0.99
+    gae_lambda: Finite = 0.95
+    clip_range: Positive = 0.2
+    ent_coef: Finite = 0.0
+    log_std_init: Finite = -0.5
+    hidden: Widths = (64, 64)
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
-class OffPolicy:
+class OffPolicy(Checked):
     """Settings of SAC and TD3, under the names of Stable-Baselines3.
 
     Attributes:
@@ -63,36 +68,20 @@ class OffPolicy:
         hidden: Widths of the hidden layers of actor and critics, with ReLU.
     """
 
-    buffer_size: int = 200_000
-    learning_starts: int = 2000
-    train_freq: int = 1
-    gradient_steps: int = 4
-    batch_size: int = 256
-    learning_rate: float = 1e-3
-    gamma: float = 0.98
-    tau: float = 0.01
-    noise: float = 0.1
-    hidden: tuple[int, ...] = (64, 64)
-
-    def __post_init__(self) -> None:
-        require_count(
-            buffer_size=self.buffer_size, learning_starts=self.learning_starts,
-            train_freq=self.train_freq, gradient_steps=self.gradient_steps,
-            batch_size=self.batch_size,
-        )  # fmt: skip
-        require_positive(learning_rate=self.learning_rate, tau=self.tau, noise=self.noise)
-        _require(self)
-
-
-def _require(settings: OnPolicy | OffPolicy) -> None:
-    if not 0.0 < settings.gamma <= 1.0:
-        raise ValueError(f"gamma must be above 0 and at most 1, got {settings.gamma}")
-    if not settings.hidden or min(settings.hidden) < 1:
-        raise ValueError(f"hidden must be widths of at least 1, got {settings.hidden}")
+    buffer_size: Count = 200_000
+    learning_starts: Count = 2000
+    train_freq: Count = 1
+    gradient_steps: Count = 4
+    batch_size: Count = 256
+    learning_rate: Positive = 1e-3
+    gamma: Discount = 0.98
+    tau: Positive = 0.01
+    noise: Positive = 0.1
+    hidden: Widths = (64, 64)
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
-class TrainConfig:
+class TrainConfig(Checked):
     """Settings of a run.
 
     Attributes:
@@ -118,30 +107,25 @@ class TrainConfig:
     task: str
     algorithm: str
     learner: OnPolicy | OffPolicy
-    steps: int = _STEPS
+    steps: Count = _STEPS
     seed: int = 0
-    envs: int = 8
+    envs: Count = 8
     options: Mapping[str, float] = field(default_factory=dict)
     arguments: Mapping[str, Any] = field(default_factory=dict)
-    residual: float = 0.0
+    residual: Annotated[float, partial(number, at_least=0.0, at_most=50.0, unit="K")] = 0.0
     start: str = "scripted"
-    interval: int = 10_000
-    evaluate_every: int = 2
-    evaluation_episodes: int = 5
+    interval: Count = 10_000
+    evaluate_every: Count = 2
+    evaluation_episodes: Count = 5
 
     def __post_init__(self) -> None:
         task = task_class(self.task)
+        Checked.__post_init__(self)
         if self.algorithm not in ALGORITHMS:
             raise ValueError(f"algorithm must be one of {ALGORITHMS}, got {self.algorithm!r}")
         kind = OnPolicy if self.algorithm == "ppo" else OffPolicy
         if not isinstance(self.learner, kind):
             raise ValueError(f"learner must be {kind.__name__}, got {type(self.learner).__name__}")
-        require_count(
-            steps=self.steps, envs=self.envs, interval=self.interval,
-            evaluate_every=self.evaluate_every, evaluation_episodes=self.evaluation_episodes,
-        )  # fmt: skip
-        if not 0.0 <= self.residual <= 50.0:
-            raise ValueError(f"residual must be between 0 and 50 K, got {self.residual}")
         if self.residual and not task.legs:
             raise ValueError(f"residual must be 0 for {self.task}, which has no gait")
         if self.residual and self.arguments.get("action") != "power":
@@ -159,11 +143,12 @@ def default_config(task: str, algorithm: str, **change: Any) -> TrainConfig:
     Raises:
         ValueError: If a field is out of range or unknown.
     """
-    learner: OnPolicy | OffPolicy = OnPolicy() if algorithm == "ppo" else OffPolicy()
-    common: dict[str, Any] = {"task": task, "algorithm": algorithm, "learner": learner}
     known = task_class(task)
-    common["steps"] = known.learning_steps.get(algorithm, _STEPS)
-    common["options"] = dict(known.learning_options)
-    residual = {"action": "power"} if change.get("residual") else known.learning_arguments
-    common["arguments"] = dict(residual)
-    return TrainConfig(**common | change)
+    arguments = {"action": "power"} if change.get("residual") else known.learning_arguments
+    common: dict[str, Any] = {
+        "learner": OnPolicy() if algorithm == "ppo" else OffPolicy(),
+        "steps": known.learning_steps.get(algorithm, _STEPS),
+        "options": dict(known.learning_options),
+        "arguments": dict(arguments),
+    }
+    return TrainConfig(task=task, algorithm=algorithm, **common | change)

@@ -9,8 +9,9 @@ import io
 import os
 import pickle
 import random
-from collections.abc import Callable, Iterator
-from contextlib import ExitStack, closing, contextmanager
+import shutil
+from contextlib import ExitStack, closing
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -23,25 +24,21 @@ from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.logger import Logger
 from stable_baselines3.common.noise import NormalActionNoise
 from stable_baselines3.common.vec_env import VecNormalize
-from tqdm import tqdm
 
-from tca_mj.agents.policies import Origin, Policy, SavedPolicy
-from tca_mj.agents.rollout import rollout
-from tca_mj.agents.train.config import OnPolicy, TrainConfig
+from tca_mj.agents.episode import RECORDING, VIDEO, Episode
+from tca_mj.agents.output import write_csv
+from tca_mj.agents.policies import SavedPolicy
+from tca_mj.agents.policies.actors import first_gait
+from tca_mj.agents.rollout import earned, rollout
+from tca_mj.agents.train.config import TrainConfig
 from tca_mj.agents.train.export import exported
 from tca_mj.agents.train.learning_env import LearningEnv
-from tca_mj.agents.train.runs import CURVE, LIBRARIES, RunFolder
+from tca_mj.agents.train.runs import CURVE, RunFolder, drawn, progress_bar
 from tca_mj.agents.train.sb3_env import TaskVecEnv
-from tca_mj.agents.train.search import first_gait
-from tca_mj.envs.wrappers import RecordRerun
-from tca_mj.machine import versions
-from tca_mj.record.film import Film
-from tca_mj.record.render import RenderingUnavailable
-from tca_mj.registry import episode_steps, make
+from tca_mj.registry import make
 
 EVALUATIONS = "evaluations.csv"
 BEST, LAST = "best", "last"  # with the ending of their kind
-RECORDING, VIDEO = "best.rrd", "best.mp4"
 
 _FILM = 10.0  # length of the film of an episode that takes all its time [s]
 
@@ -49,12 +46,7 @@ _LEARNERS: dict[str, Any] = {"ppo": PPO, "sac": SAC, "td3": TD3}
 
 
 def train(
-    config: TrainConfig,
-    out: Path,
-    *,
-    command: str = "",
-    video: bool = True,
-    progress: bool = True,
+    config: TrainConfig, out: Path, *, command: str = "", video: bool = True, progress: bool = True
 ) -> SavedPolicy:
     """Trains a policy, or goes on with the run that ``out`` holds.
 
@@ -76,28 +68,25 @@ def train(
         FileNotFoundError, ValueError: If the settings do not fit, or not to the run in ``out``.
         KeyboardInterrupt: As it came; the same call goes on from the last interval.
     """
-    with _one_thread():
-        run = Run(config, RunFolder(out, config, command), command)
-        bar = tqdm(
-            total=config.steps, initial=run.model.num_timesteps, unit="step", unit_scale=True,
-            disable=None if progress else True,
-        )  # fmt: skip
-        with closing(bar), closing(run):
-            if not run.new:
-                run.explain()  # the state may be newer, if the run was killed in between
-            left = config.steps - run.model.num_timesteps
-            if left > 0:
-                # No log of its own, which would empty what the curve takes from the logger.
-                never: Any = None
-                run.model.learn(
-                    left, _Watch(run, bar), log_interval=never, reset_num_timesteps=run.new
-                )
-                run.mark(last=True)
-            if run.best is None:
-                run.evaluate()
-            run.record(video=video)
-        assert run.best is not None
-        return run.best[1]
+    with ExitStack() as ends:
+        ends.callback(torch.set_num_threads, torch.get_num_threads())
+        torch.set_num_threads(1)
+        run = ends.enter_context(closing(Run(config, RunFolder(out, config, command))))
+        bar = progress_bar(config.steps, run.model.num_timesteps, progress)
+        ends.callback(bar.close)
+        if not run.new:
+            run.explain()  # the state may be newer, if the run was killed in between
+        left = config.steps - run.model.num_timesteps
+        if left > 0:
+            # No log of its own, which would empty what the curve takes from the logger.
+            silent: dict[str, Any] = {"log_interval": None, "reset_num_timesteps": run.new}
+            run.model.learn(left, _Watch(run, bar), **silent)
+            run.mark(last=True)
+        if run.best is None:
+            run.evaluate()
+        run.record(video=video)
+    assert run.best is not None
+    return run.best[1]
 
 
 class Run:
@@ -111,13 +100,14 @@ class Run:
         evaluations: Those so far.
     """
 
-    def __init__(self, config: TrainConfig, folder: RunFolder, command: str) -> None:
-        self.config, self.folder, self.command = config, folder, command
+    def __init__(self, config: TrainConfig, folder: RunFolder) -> None:
+        self.config, self.folder = config, folder
         state = folder.load()
         self.new = state is None
-        self.rows: list[dict[str, float]] = [] if state is None else state["rows"]
-        self.evaluations: list[dict[str, float]] = [] if state is None else state["evaluations"]
-        self.best: tuple[float, SavedPolicy] | None = None if state is None else state["best"]
+        known = state or {"rows": [], "evaluations": [], "best": None}
+        self.rows: list[dict[str, float]] = known["rows"]
+        self.evaluations: list[dict[str, float]] = known["evaluations"]
+        self.best: tuple[float, SavedPolicy] | None = known["best"]
         self._gait = first_gait(config.task, config.start) if config.residual else None
         tasks = TaskVecEnv.make(
             config.task, config.envs, reset_options=dict(config.options), **config.arguments
@@ -138,18 +128,9 @@ class Run:
                 self.model.replay_buffer = pickle.loads(state["replay"])  # type: ignore[attr-defined]
             _set_generators(self.model, state["generators"])
         self.model.set_logger(Logger(folder=None, output_formats=[]))
-        self.test_env: gym.Env[Any, Any] = self._made()
+        self.test_env: gym.Env[Any, Any] = make(config.task, **config.arguments)
         self.board = folder.tensorboard(self.model.num_timesteps)
         self.marks = self.model.num_timesteps // config.interval
-
-    def _made(self) -> gym.Env[Any, Any]:
-        """The task, by itself."""
-        made: gym.Env[Any, Any] = make(self.config.task, **self.config.arguments)
-        return made
-
-    def due(self) -> bool:
-        """Whether an interval is over."""
-        return self.model.num_timesteps // self.config.interval > self.marks
 
     def mark(self, *, last: bool = False) -> None:
         """Adds a row to the curve, evaluates if it is time to, and writes all there is."""
@@ -169,10 +150,9 @@ class Run:
     def evaluate(self) -> None:
         """Runs the episodes of an evaluation, and keeps the policy if it is the best so far."""
         config, saved = self.config, self.policy()
-        random = np.random.default_rng((config.seed, 1))
-        seeds = random.integers(2**31, size=config.evaluation_episodes).tolist()
-        policy, options = saved.make(self.test_env), dict(config.options)
-        found = [episode(self.test_env, policy, seed, options) for seed in seeds]
+        seeds = drawn(config.seed, 1, config.evaluation_episodes)
+        env, policy = self.test_env, saved.make(self.test_env)
+        found = [earned(rollout(env, policy, seed=s, options=config.options)) for s in seeds]
         row = {"steps": float(self.model.num_timesteps)}
         row |= {name: float(np.mean([each[name] for each in found])) for name in found[0]}
         self.evaluations.append(row)
@@ -183,20 +163,13 @@ class Run:
 
     def policy(self) -> SavedPolicy:
         """The policy as it is now."""
-        config, gait = self.config, self._gait
-        origin = Origin(
-            algorithm=config.algorithm, seed=config.seed, steps=self.model.num_timesteps,
-            command=self.command, versions=versions(*LIBRARIES),
-            source=f"corrects the gait '{config.start}'" if gait else "",
-        )  # fmt: skip
-        network = exported(self.model, self.normalise)
-        if gait is None:
-            return SavedPolicy(
-                task=config.task, origin=origin, network=network, arguments=config.arguments
-            )
+        config = self.config
+        gait, steering = self._gait or (None, ())
+        source = f"corrects the gait '{config.start}'" if gait else ""
         return SavedPolicy(
-            task=config.task, origin=origin, network=network, gait=gait[0], steering=gait[1],
-            bound=config.residual, arguments=config.arguments,
+            task=config.task, network=exported(self.model, self.normalise), gait=gait,
+            steering=steering, bound=config.residual, arguments=config.arguments,
+            origin=self.folder.origin(config.algorithm, self.model.num_timesteps, source),
         )  # fmt: skip
 
     def save(self) -> None:
@@ -204,23 +177,25 @@ class Run:
         buffer, model = io.BytesIO(), self.model
         model.save(buffer)
         replay = getattr(model, "replay_buffer", None)
-        state = {
-            "model": buffer.getvalue(),
-            "replay": None if replay is None else pickle.dumps(replay),
-            "normalise": pickle.dumps(self.normalise),
-            "returns": self.normalise.returns,
-            "env": self.env.state(),
-            "generators": _generators(model),
-            "rows": self.rows,
-            "evaluations": self.evaluations,
-            "best": self.best,
-        }
-        self.folder.save(state)
+        self.folder.save(
+            {
+                "model": buffer.getvalue(),
+                "replay": None if replay is None else pickle.dumps(replay),
+                "normalise": pickle.dumps(self.normalise),
+                "returns": self.normalise.returns,
+                "env": self.env.state(),
+                "generators": _generators(model),
+                "rows": self.rows,
+                "evaluations": self.evaluations,
+                "best": self.best,
+            }
+        )
         self.explain()
 
     def explain(self) -> None:
         """Writes what follows from the state: curves and policies."""
-        self.folder.write_curves({CURVE: self.rows, EVALUATIONS: self.evaluations})
+        write_csv(self.folder.path / CURVE, self.rows)
+        write_csv(self.folder.path / EVALUATIONS, self.evaluations)
         self.policy().save(self.folder.path / f"{LAST}.npz")
         if self.best is not None:
             self.best[1].save(self.folder.path / f"{BEST}.npz")
@@ -230,39 +205,18 @@ class Run:
         """Records an episode of the best policy; its files are replaced when they are whole."""
         if self.best is None:
             return
-        folder, made = self.folder.path, [RECORDING]
-        with ExitStack() as ends:
-            env = ends.enter_context(
-                closing(RecordRerun(self._made(), folder / f"part-{RECORDING}"))
-            )
-            task: Any = env.unwrapped
-            frames: list[Callable[[], None]] = []
-            if video:
-                steps = episode_steps(self.config.task, task.control_period) or 1
-                limit = steps * task.control_period
-                try:
-                    film = Film(
-                        task.sim, folder / f"part-{VIDEO}", camera=task._camera,
-                        speed=max(1.0, limit / _FILM),
-                    )  # fmt: skip
-                    ends.callback(film.close)
-                    frames, made = [film.frame], [*made, VIDEO]
-                except ImportError as error:
-                    tqdm.write(f"{VIDEO} is left out: {error}")
-
-            def each() -> None:
-                try:
-                    for frame in frames:
-                        frame()
-                except RenderingUnavailable as error:
-                    frames.clear()
-                    made.remove(VIDEO)
-                    tqdm.write(f"{VIDEO} is left out: {error}")
-
-            options = dict(self.config.options)
-            episode(env, self.best[1].make(env), self.config.seed, options, each)
-        for name in made:
-            os.replace(folder / f"part-{name}", folder / name)
+        folder, config = self.folder.path, self.config
+        env: gym.Env[Any, Any] = make(config.task, **config.arguments)
+        episode = Episode(
+            env, self.best[1].make(env), names=(config.task, BEST), seed=config.seed,
+            out=folder / "part", options=config.options,
+            files=(RECORDING, VIDEO) if video else (RECORDING,),
+        )  # fmt: skip
+        limited = np.isfinite(episode.limit)
+        speed = max(1.0, episode.limit / _FILM) if limited else episode.task.film_speed
+        for name in episode.run(episode.limit, speed=speed, progress=False)["files"]:
+            os.replace(folder / "part" / name, folder / name.replace("rollout", BEST))
+        shutil.rmtree(folder / "part")
 
     def close(self) -> None:
         """Ends what the run has opened."""
@@ -284,74 +238,30 @@ class _Watch(BaseCallback):
 
     def _on_rollout_start(self) -> None:
         self.bar.update(self.num_timesteps - self.bar.n)
-        if self.run.due():
+        if self.num_timesteps // self.run.config.interval > self.run.marks:
             self.run.mark()
-            self.bar.set_postfix(
-                {
-                    "return": f"{self.run.rows[-1].get('return_mean', np.nan):.2f}",
-                    "best": f"{self.run.best[0] if self.run.best else np.nan:.2f}",
-                }
-            )
+            now = self.run.rows[-1].get("return_mean", np.nan)
+            best = self.run.best[0] if self.run.best else np.nan
+            self.bar.set_postfix({"return": f"{now:.2f}", "best": f"{best:.2f}"})
 
     def _on_step(self) -> bool:
         return True
 
 
-def episode(
-    env: gym.Env[Any, Any],
-    policy: Policy,
-    seed: int,
-    options: dict[str, Any],
-    each: Callable[[], None] = lambda: None,
-) -> dict[str, float]:
-    """Runs one episode.
-
-    Args:
-        env: The task.
-        policy: Who acts.
-        seed: Seed of the episode.
-        options: Options of the reset.
-        each: Called after the reset and after every step.
-
-    Returns:
-        ``return``, ``length``, ``success``, and the sum of each reward term.
-    """
-    sums = {"return": 0.0, "length": -1.0, "success": 0.0}
-    for step in rollout(env, policy, seed=seed, options=options):
-        each()
-        sums["return"] += step.reward
-        sums["length"] += 1.0
-        for name, term in step.info.get("reward_terms", {}).items():
-            sums[f"term_{name}"] = sums.get(f"term_{name}", 0.0) + float(term)
-    return sums | {"success": float(step.info["success"])}
-
-
 def _learner(config: TrainConfig, env: VecNormalize) -> BaseAlgorithm:
     """A new model."""
-    settings = config.learner
-    common: dict[str, Any] = {
-        "policy": "MlpPolicy", "env": env, "seed": config.seed, "device": "cpu",
-        "learning_rate": settings.learning_rate, "gamma": settings.gamma,
-        "batch_size": settings.batch_size,
-    }  # fmt: skip
-    hidden = list(settings.hidden)
-    if isinstance(settings, OnPolicy):
-        return PPO(
-            **common, n_steps=settings.n_steps, n_epochs=settings.n_epochs,
-            gae_lambda=settings.gae_lambda, clip_range=settings.clip_range,
-            ent_coef=settings.ent_coef,
-            policy_kwargs={"net_arch": hidden, "log_std_init": settings.log_std_init},
-        )  # fmt: skip
-    common |= {
-        "buffer_size": settings.buffer_size, "learning_starts": settings.learning_starts,
-        "train_freq": settings.train_freq, "gradient_steps": settings.gradient_steps,
-        "tau": settings.tau, "policy_kwargs": {"net_arch": hidden},
-    }  # fmt: skip
-    if config.algorithm == "sac":
-        return SAC(**common)
-    n = env.action_space.shape or (1,)
-    noise = NormalActionNoise(np.zeros(n), np.full(n, settings.noise))
-    return TD3(**common, action_noise=noise)
+    settings = asdict(config.learner)
+    network: dict[str, Any] = {"net_arch": list(settings.pop("hidden"))}
+    if "log_std_init" in settings:
+        network["log_std_init"] = settings.pop("log_std_init")
+    noise = settings.pop("noise", None)
+    if config.algorithm == "td3":
+        n = env.action_space.shape or (1,)
+        settings["action_noise"] = NormalActionNoise(np.zeros(n), np.full(n, noise))
+    model: BaseAlgorithm = _LEARNERS[config.algorithm](
+        "MlpPolicy", env, seed=config.seed, device="cpu", policy_kwargs=network, **settings
+    )
+    return model
 
 
 def _generators(model: BaseAlgorithm) -> dict[str, Any]:
@@ -369,13 +279,3 @@ def _set_generators(model: BaseAlgorithm, states: dict[str, Any]) -> None:
     np.random.set_state(states["numpy"])
     torch.set_rng_state(states["torch"])
     model.action_space.np_random.bit_generator.state = states["actions"]
-
-
-@contextmanager
-def _one_thread() -> Iterator[None]:
-    before = torch.get_num_threads()
-    torch.set_num_threads(1)
-    try:
-        yield
-    finally:
-        torch.set_num_threads(before)

@@ -33,8 +33,9 @@ def exported(model: BaseAlgorithm, normalise: VecNormalize) -> Network:
     space: Any = model.action_space
     if not (np.all(space.low == -1.0) and np.all(space.high == 1.0)):
         raise ValueError(f"actions must lie between -1 and 1, got {space}")
-    layers = [part for module in actor for part in module.modules() if _is(part, "Linear")]
-    relu = any(_is(part, "ReLU") for module in actor for part in module.modules())
+    parts = [part for module in actor for part in module.modules()]
+    layers: list[Any] = [part for part in parts if isinstance(part, torch.nn.Linear)]
+    relu = any(isinstance(part, torch.nn.ReLU) for part in parts)
     statistics: Any = normalise.obs_rms
     return Network(
         weights=tuple(layer.weight.detach().numpy().copy() for layer in layers),
@@ -46,7 +47,3 @@ def exported(model: BaseAlgorithm, normalise: VecNormalize) -> Network:
         activation="relu" if relu else "tanh",
         squash=squash,
     )
-
-
-def _is(part: Any, name: str) -> bool:
-    return isinstance(part, getattr(torch.nn, name))

@@ -2,7 +2,7 @@
 
 import functools
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 from itertools import islice
 from typing import Any
 
@@ -11,6 +11,7 @@ import numpy as np
 
 from tca_mj.agents.policies.gait import GaitPolicy
 from tca_mj.agents.rollout import rollout
+from tca_mj.checks import Checked, Positive
 from tca_mj.control import Gait
 
 # Where penalties begin, somewhat within what is demanded of a gait, and how much they cost. The
@@ -80,26 +81,19 @@ def run_trial(trial: Trial) -> Headway:
     first = round(round(trial.settling / trial.gait.period) * cycle)
     steps = first + round(max(1, round(trial.window / trial.gait.period)) * cycle)
     options = {"randomise": trial.randomise, "direction": 0.0}
-    episode = enumerate(rollout(env, policy, seed=trial.seed, options=options))
-    _, step = next(episode)
-    info = begin = step.info
-    hottest, tightest, done = 0.0, 0.0, 0
-    for done, step in islice(episode, steps):
-        info = step.info
-        hottest = max(hottest, float(info["temperature"][:tcas].max()))
-        tightest = max(tightest, float(info["tension"][:tcas].max()))
-        if done == first:
-            begin = info
+    episode = rollout(env, policy, seed=trial.seed, options=options)
+    infos = [step.info for step in islice(episode, steps + 1)]
+    done = len(infos) - 1
+    begin, end = infos[min(first, done)], infos[-1]
     # An early end leaves less distance for the same time; the power is that of the time walked.
     judged = (steps - first) * period
     walked = max(done - first, 1) * period
-    moved = done > first
     return Headway(
-        speed=(info["distance"] - begin["distance"]) / judged if moved else 0.0,
-        aside=(info["drift"] - begin["drift"]) / judged if moved else 0.0,
-        power=float(np.sum(info["energy"] - begin["energy"])) / walked if moved else 0.0,
-        temperature=hottest,
-        tension=tightest,
+        speed=(end["distance"] - begin["distance"]) / judged,
+        aside=(end["drift"] - begin["drift"]) / judged,
+        power=float(np.sum(end["energy"] - begin["energy"])) / walked,
+        temperature=float(np.max([info["temperature"][:tcas] for info in infos[1:]])),
+        tension=float(np.max([info["tension"][:tcas] for info in infos[1:]])),
         missed=1.0 - done / steps,
         steps=done,
     )
@@ -111,16 +105,11 @@ def _env(task: str) -> gym.Env[Any, Any]:
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
-class Reference:
+class Reference(Checked):
     """The gait that others are compared with: its mean speed [m/s] and electrical power [W]."""
 
-    speed: float
-    power: float
-
-    def __post_init__(self) -> None:
-        for name in ("speed", "power"):
-            if not 0.0 < getattr(self, name) < np.inf:
-                raise ValueError(f"{name} must be finite and above 0, got {getattr(self, name)}")
+    speed: Positive
+    power: Positive
 
     @classmethod
     def of(cls, trials: Sequence[Headway]) -> "Reference":
@@ -150,20 +139,19 @@ def score(trials: Sequence[Headway], reference: Reference) -> dict[str, float]:
         tension: 10 for each newton by which the tightest TCA is above 0.70 N, mean.
         fall: Share of the episodes that ended early, and mean share of the time that they missed.
     """
-    table = {
-        name: np.array([getattr(trial, name) for trial in trials], dtype=np.float64)
-        for name in ("speed", "aside", "power", "temperature", "tension", "missed")
-    }
-    speed = float(table["speed"].mean()) / reference.speed
-    power = float(table["power"].mean()) / reference.power
-    distance = np.maximum(table["speed"], SLOWEST * reference.speed)
-    drift = float(np.mean(np.abs(table["aside"]) / distance))
+    speeds, aside, powers, temperature, tension, missed, _ = (
+        np.array(column, dtype=np.float64) for column in zip(*map(astuple, trials), strict=True)
+    )
+    speed = float(speeds.mean()) / reference.speed
+    power = float(powers.mean()) / reference.power
+    distance = np.maximum(speeds, SLOWEST * reference.speed)
+    drift = float(np.mean(np.abs(aside) / distance))
     terms = {
         "speed": speed,
         "energy": -ENERGY_WEIGHT * max(0.0, power - ENERGY_SHARE * speed),
         "drift": -DRIFT_WEIGHT * max(0.0, drift - DRIFT_SHARE),
-        "heat": -HEAT_WEIGHT * float(np.mean(np.maximum(table["temperature"] - HOTTEST, 0.0))),
-        "tension": -TENSION_WEIGHT * float(np.mean(np.maximum(table["tension"] - TENSION, 0.0))),
-        "fall": -float(np.mean((table["missed"] > 0.0) + table["missed"])),
+        "heat": -HEAT_WEIGHT * float(np.mean(np.maximum(temperature - HOTTEST, 0.0))),
+        "tension": -TENSION_WEIGHT * float(np.mean(np.maximum(tension - TENSION, 0.0))),
+        "fall": -float(np.mean((missed > 0.0) + missed)),
     }
     return {"score": sum(terms.values()), **terms}

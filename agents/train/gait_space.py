@@ -1,7 +1,9 @@
 """Gaits as points of a unit cube, in which a search may look for better ones."""
 
 import math
+from collections import defaultdict
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -106,30 +108,22 @@ class GaitSpace:
         point = np.asarray(point, dtype=np.float64)
         if point.shape != (len(self.names),) or not ((point >= 0.0) & (point <= 1.0)).all():
             raise ValueError(f"point must be {len(self.names)} numbers from 0 to 1, got {point}")
-        numbers = iter(point.tolist())
-
-        def row(n: int = _TCAS) -> Array:
-            return np.array([next(numbers) for _ in range(n)])
-
-        period = math.exp(_between(next(numbers), *np.log(PERIOD)))
         offset = np.array(self.centre.offset)
-        offset[1:] = (offset[1:] + row(_TCAS) - 0.5) % 1.0
-        tables: dict[str, list[tuple[float, ...]]] = {
-            name: [] for name in ("start", "duty", "hot", "warm")
-        }
+        offset[1:] = (offset[1:] + point[1:4] - 0.5) % 1.0
+        tables: dict[str, list[tuple[float, ...]]] = defaultdict(list)
         steering: list[float] = []
-        for pair in _PAIRS.values():
+        for pair, numbers in zip(_PAIRS.values(), point[4:].reshape(2, -1), strict=True):
+            starts, duty, hot, warm = np.split(numbers[:-1], (2, 5, 8))
             start = self.centre.table("start")[pair.start]
-            start[1:] = (start[1:] + row(_TCAS - 1) - 0.5) % 1.0
-            duty = _between(row(), *DUTY)
-            hot = _between(row(), COOLEST, self.hottest)
-            warm = np.minimum(COLD + row() * (hot - COLD), hot)
-            rows = {"start": start, "duty": duty, "hot": hot, "warm": warm}
-            for name, value in rows.items():
-                tables[name] += [tuple(np.asarray(value).tolist())] * 2
-            steering += [float(_between(next(numbers), *STEERING))] * 2
+            start[1:] = (start[1:] + starts - 0.5) % 1.0
+            hot = _between(hot, COOLEST, self.hottest)
+            warm = np.minimum(COLD + warm * (hot - COLD), hot)
+            rows = {"start": start, "duty": _between(duty, *DUTY), "hot": hot, "warm": warm}
+            for name, row in rows.items():
+                tables[name] += [tuple(row.tolist())] * 2
+            steering += [float(_between(numbers[-1], *STEERING))] * 2
         gait = Gait(
-            period=period,
+            period=math.exp(_between(point[0], *np.log(PERIOD))),
             offset=tuple(offset.tolist()),
             **{name: tuple(rows) for name, rows in tables.items()},
         )
@@ -140,5 +134,5 @@ def _share(value: float, low: float, high: float) -> float:
     return (value - low) / (high - low)
 
 
-def _between(share: float | Array, low: float, high: float) -> float | Array:
+def _between(share: Any, low: float, high: float) -> Any:
     return np.minimum(low + share * (high - low), high)

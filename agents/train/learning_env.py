@@ -13,6 +13,7 @@ from stable_baselines3.common.vec_env.base_vec_env import VecEnvStepReturn
 
 from tca_mj.agents.policies.files import with_clock
 from tca_mj.agents.policies.gait import GaitPolicy
+from tca_mj.agents.rollout import tally
 from tca_mj.agents.train.sb3_env import TaskVecEnv
 from tca_mj.control import Gait
 
@@ -34,10 +35,7 @@ class LearningEnv(VecEnvWrapper):
     venv: TaskVecEnv
 
     def __init__(
-        self,
-        venv: TaskVecEnv,
-        gait: tuple[Gait, tuple[float, ...]] | None = None,
-        bound: float = 0.0,
+        self, venv: TaskVecEnv, gait: tuple[Gait, tuple[float, ...]] | None = None, bound: float = 0
     ) -> None:
         """Wraps ``venv``.
 
@@ -69,14 +67,9 @@ class LearningEnv(VecEnvWrapper):
     def step_async(self, actions: NDArray[np.float32]) -> None:
         """Turns corrections into actions."""
         if self._walkers:
-            actions = np.stack(
-                [
-                    walker.act(seen, self._bound * action.astype(np.float64))
-                    for walker, seen, action in zip(
-                        self._walkers, self._seen, actions, strict=True
-                    )
-                ]
-            )
+            changes = self._bound * actions.astype(np.float64)
+            each = zip(self._walkers, self._seen, changes, strict=True)
+            actions = np.stack([walker.act(seen, change) for walker, seen, change in each])
         self.venv.step_async(actions)
 
     def step_wait(self) -> VecEnvStepReturn:
@@ -84,16 +77,13 @@ class LearningEnv(VecEnvWrapper):
         observations, rewards, dones, infos = self.venv.step_wait()
         for i, (reward, done, info) in enumerate(zip(rewards, dones, infos, strict=True)):
             sums = self._sums[i]
-            sums["return"] += float(reward)
-            sums["length"] += 1.0
-            for name, term in info.get("reward_terms", {}).items():
-                sums[f"term_{name}"] += float(term)
+            tally(sums, reward, info)
             if not done:
                 continue
             over = "truncation_reason" in info or not info["TimeLimit.truncated"]
-            success = bool(info.get("success", info.get("is_success", False)))
-            sums |= {"success": float(success), "early_end": float(over and not success)}
-            self.finished.append(dict(sums))
+            ends = {"success": float(info["success"]),
+                    "early_end": float(over and not info["success"])}  # fmt: skip
+            self.finished.append(dict(sums | ends))
             self._sums[i] = defaultdict(float)
             if self._walkers:
                 last = info["terminal_observation"]

@@ -4,22 +4,34 @@ The state is one file that is replaced in one go; what else lies in the folder f
 only explains it. So a run that is killed goes on from its last state when it is called again.
 """
 
-import csv
-import io
 import json
 import pickle
-from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from tqdm import tqdm
+
+from tca_mj.agents.output import write_json
+from tca_mj.agents.policies import Origin
 from tca_mj.files import write_whole
 from tca_mj.machine import machine, versions
 
 RUN, STATE, CURVE, TENSORBOARD = "run.json", "state.pkl", "curve.csv", "tensorboard"
 LIBRARIES = ("torch", "stable-baselines3", "cmaes")
 
-Row = Mapping[str, float | int | str]
+
+def drawn(seed: int, stream: int, count: int) -> list[int]:
+    """Seeds of episodes: those of a stream of a run are always the same."""
+    return np.random.default_rng((seed, stream)).integers(2**31, size=count).tolist()
+
+
+def progress_bar(steps: int, done: int, progress: bool) -> Any:
+    """A bar that counts steps, where there is a terminal and ``progress`` is wanted."""
+    return tqdm(
+        total=steps, initial=done, unit="step", unit_scale=True, disable=None if progress else True
+    )
 
 
 class RunFolder:
@@ -41,7 +53,7 @@ class RunFolder:
         Raises:
             ValueError: If the folder holds a run with other settings.
         """
-        self.path = path
+        self.path, self.seed, self.command = path, config.seed, command
         settings = json.loads(json.dumps(asdict(config)))
         file = path / RUN
         if file.is_file():
@@ -53,14 +65,15 @@ class RunFolder:
             ]
             if other:
                 raise ValueError(f"{path} holds a run with {'; '.join(other)}")
-        about = {
-            "config": settings,
-            "command": command,
-            "versions": versions(*LIBRARIES),
-            "machine": machine(),
-        }
-        text = json.dumps(about, indent=2, ensure_ascii=False) + "\n"
-        write_whole(file, text.encode())
+        made = {"versions": versions(*LIBRARIES), "machine": machine()}
+        write_json(file, {"config": settings, "command": command, **made})
+
+    def origin(self, algorithm: str, steps: int, source: str) -> Origin:
+        """Where a policy of the run comes from; arguments as those of ``Origin``."""
+        return Origin(
+            algorithm=algorithm, seed=self.seed, steps=steps, command=self.command, source=source,
+            versions=versions(*LIBRARIES),
+        )  # fmt: skip
 
     def load(self) -> Any:
         """The last state, or None. It is a pickle: only load runs that you trust."""
@@ -70,16 +83,6 @@ class RunFolder:
     def save(self, state: Any) -> None:
         """Replaces the state by what ``load`` is to give back."""
         write_whole(self.path / STATE, pickle.dumps(state, protocol=pickle.HIGHEST_PROTOCOL))
-
-    def write_curves(self, curves: Mapping[str, Sequence[Row]]) -> None:
-        """Writes CSV files, whose columns are all keys in the order in which they come up."""
-        for name, rows in curves.items():
-            columns = list(dict.fromkeys(key for row in rows for key in row))
-            text = io.StringIO()
-            table = csv.DictWriter(text, columns, lineterminator="\n")
-            table.writeheader()
-            table.writerows(rows)
-            write_whole(self.path / name, text.getvalue().encode())
 
     def tensorboard(self, step: int) -> Any:
         """A writer for TensorBoard that hides what an interrupted run wrote from ``step`` on."""

@@ -56,15 +56,14 @@ class TaskVecEnv(VecEnv):
 
     def reset(self) -> NDArray[np.float32]:
         """Begins new episodes with the seeds and options that were set for this once."""
-        first = []
-        for i, (seed, options) in enumerate(zip(self._seeds, self._options, strict=True)):
-            observation, self.reset_infos[i] = self.tasks.restart(
-                i, seed=seed, options=options or None
-            )
-            first.append(observation)
+        begun = [
+            self.tasks.restart(i, seed=seed, options=options or None)
+            for i, (seed, options) in enumerate(zip(self._seeds, self._options, strict=True))
+        ]
+        self.reset_infos = [info for _, info in begun]
         self._reset_seeds()
         self._reset_options()
-        return np.stack(first)
+        return np.stack([observation for observation, _ in begun])
 
     def step_async(self, actions: NDArray[np.float32]) -> None:
         """Keeps the actions for ``step_wait``."""

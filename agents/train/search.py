@@ -5,39 +5,36 @@ against it. Nothing depends on how many processes there are, on the order in whi
 on whether the run was interrupted: all draws of a generation come from the seed and its number.
 """
 
-import multiprocessing
 import pickle
-import signal
-import threading
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
-from multiprocessing.connection import wait
-from multiprocessing.process import BaseProcess
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Annotated
 
 import numpy as np
 from cmaes import CMA
 from numpy.typing import NDArray
-from tqdm import tqdm
 
-from tca_mj.agents.policies import Origin, SavedPolicy, find
-from tca_mj.agents.policies.actors import arguments_of, scripted
-from tca_mj.agents.policies.gait import GaitPolicy
+from tca_mj.agents.output import write_csv
+from tca_mj.agents.policies import SavedPolicy
+from tca_mj.agents.policies.actors import TROT, first_gait
 from tca_mj.agents.train.gait_score import Headway, Reference, Trial, run_trial, score
 from tca_mj.agents.train.gait_space import GaitSpace
-from tca_mj.agents.train.runs import CURVE, LIBRARIES, RunFolder
-from tca_mj.checks import require_count
+from tca_mj.agents.train.runs import CURVE, RunFolder, drawn, progress_bar
+from tca_mj.agents.workers import Workers
+from tca_mj.checks import Checked, Count, number, require_count
 from tca_mj.control import Gait
-from tca_mj.machine import versions
-from tca_mj.registry import make, task_class
+from tca_mj.registry import task_class
 
-TROT = (0.5, 0.0, 0.0, 0.5)  # offsets of four legs, diagonal ones together
 BEST, LAST = "best.json", "last.json"
+
+Found = list[list[Headway]]
+Steered = tuple[Gait, tuple[float, ...]]  # a gait and its steering
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
-class SearchConfig:
+class SearchConfig(Checked):
     """Settings of a search.
 
     Attributes:
@@ -61,35 +58,22 @@ class SearchConfig:
     """
 
     task: str
-    steps: int = 150_000
+    steps: Count = 150_000
     seed: int = 0
     start: str = "scripted"
-    sigma: float = 0.03
-    population: int = 14
-    episodes: int = 1
-    randomise: float = 0.2
-    settling: float = 10.0
-    window: float = 20.0
-    validate_every: int = 8
-    validation_episodes: int = 8
+    sigma: Annotated[float, partial(number, above=0.0, at_most=0.5)] = 0.03
+    population: Annotated[int, partial(number, at_least=5)] = 14
+    episodes: Count = 1
+    randomise: Annotated[float, partial(number, at_least=0.0, at_most=0.5)] = 0.2
+    settling: Annotated[float, partial(number, at_least=0.0, at_most=20.0, unit="s")] = 10.0
+    window: Annotated[float, partial(number, at_least=0.1, at_most=25.0, unit="s")] = 20.0
+    validate_every: Count = 8
+    validation_episodes: Count = 8
 
     def __post_init__(self) -> None:
         if task_class(self.task).legs != len(TROT):
             raise ValueError(f"task must have four legs that a gait can drive, got {self.task!r}")
-        require_count(
-            steps=self.steps, episodes=self.episodes, validate_every=self.validate_every,
-            validation_episodes=self.validation_episodes,
-        )  # fmt: skip
-        if self.population < 5:
-            raise ValueError(f"population must be at least 5, got {self.population}")
-        if not 0.0 < self.sigma <= 0.5:
-            raise ValueError(f"sigma must be above 0 and at most 0.5, got {self.sigma}")
-        for name, low, high in (
-            ("randomise", 0.0, 0.5), ("settling", 0.0, 20.0), ("window", 0.1, 25.0)
-        ):  # fmt: skip
-            if not low <= getattr(self, name) <= high:
-                value = getattr(self, name)
-                raise ValueError(f"{name} must be between {low} and {high}, got {value}")
+        Checked.__post_init__(self)
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -111,33 +95,6 @@ class SearchState:
     steps: int = 0
     best: tuple[float, NDArray[np.float64]] | None = None
     rows: tuple[dict[str, float | int], ...] = ()
-
-
-def first_gait(task: str, start: str) -> tuple[Gait, tuple[float, ...]]:
-    """The gait from which something starts, and its steering per leg [K/rad].
-
-    Args:
-        task: Gymnasium id.
-        start: ``scripted``; ``trot``, which is the same with diagonal legs together, half a cycle
-            after the others; or a policy's file or name.
-
-    Raises:
-        FileNotFoundError: If ``start`` is no policy.
-        ValueError: If it is a policy without a gait.
-    """
-    if start in ("scripted", "trot"):
-        env = make(task, disable_env_checker=True, **arguments_of("scripted", task))
-        script = scripted(env)
-        env.close()
-        if not isinstance(script, GaitPolicy):
-            raise ValueError(f"start must be a policy with a gait: the script of {task} has none")
-        gait = replace(script.gait, offset=TROT) if start == "trot" else script.gait
-        steering = script.steering
-        return gait, steering if isinstance(steering, tuple) else (steering,) * gait.legs
-    saved = SavedPolicy.read(find(start))
-    if saved.gait is None:
-        raise ValueError(f"start must have a gait, {start} is a {saved.kind}")
-    return saved.gait, saved.steering
 
 
 def search(
@@ -172,26 +129,24 @@ def search(
         mean=point, sigma=config.sigma, population_size=config.population, seed=config.seed
     )
     state, known = folder.load() or (SearchState(optimiser=optimiser), {})
-    run = _Search(config, folder, space, point, state, known, command)
+    run = _Search(config, folder, space, point, state, known)
     board = folder.tensorboard(state.steps)
-    bar = tqdm(
-        total=config.steps, initial=state.steps, unit="step", unit_scale=True,
-        disable=None if progress else True,
-    )  # fmt: skip
+    bar = progress_bar(config.steps, state.steps, progress)
     try:
-        with Trials(workers) as trials:
-            run.prepare(trials)
+        with Workers(workers) as processes:
+            run.processes = processes
+            run.prepare()
             while run.state.steps < config.steps:
-                run.generation(trials)
+                run.generation()
                 if run.state.generation % config.validate_every == 0:
-                    run.validate(trials)
+                    run.validate()
                 run.save()
                 for name, value in run.state.rows[-1].items():
                     board.add_scalar(f"search/{name}", value, run.state.steps)
                 board.flush()
                 bar.update(run.state.steps - bar.n)
                 bar.set_postfix(run.shown())
-            run.validate(trials)
+            run.validate()
     finally:
         run.save()
         bar.close()
@@ -199,50 +154,49 @@ def search(
     return run.policy(best=True)
 
 
+@dataclass
 class _Search:
     """A search under way.
 
     Attributes:
+        first: Its first point.
         state: Where it stands, replaced as a whole.
         known: Episodes that are finished of a step of the search that is not.
+        processes: Who runs episodes.
     """
 
-    def __init__(
-        self,
-        config: SearchConfig,
-        folder: RunFolder,
-        space: GaitSpace,
-        first: NDArray[np.float64],
-        state: SearchState,
-        known: dict[tuple[str, int], Headway],
-        command: str,
-    ) -> None:
-        self.config, self.folder, self.space, self.first = config, folder, space, first
-        self.state, self.known, self.command = state, known, command
-        self._scripted = first_gait(config.task, "scripted")
+    config: SearchConfig
+    folder: RunFolder
+    space: GaitSpace
+    first: NDArray[np.float64]
+    state: SearchState
+    known: dict[tuple[str, int], Headway]
+    processes: Workers = field(init=False)
 
-    def prepare(self, trials: "Trials") -> None:
+    def __post_init__(self) -> None:
+        self._scripted = first_gait(self.config.task, "scripted")
+
+    def prepare(self) -> None:
         """Judges the scripted gait and the first one, and what was interrupted."""
         if self.state.reference is None:
-            (found,) = self._run(trials, "reference", [self._scripted], self._validation())
-            self.state = replace(
-                self.state, reference=Reference.of(found), steps=self.state.steps + _steps([found])
-            )
+            found = self._run("reference", [self._scripted], self._validation())
+            steps = self.state.steps + _steps(found)
+            self.state = replace(self.state, reference=Reference.of(found[0]), steps=steps)
         if self.state.best is None:
-            self._judge(trials, "first", self.first)
+            self._judge("first", self.first)
             self.save()
         if self.state.generation and self.state.generation % self.config.validate_every == 0:
-            self.validate(trials)
+            self.validate()
 
-    def generation(self, trials: "Trials") -> None:
+    def generation(self) -> None:
         """Draws gaits, runs their episodes and moves the distribution."""
         state, number = self.state, self.state.generation
-        seeds = self._seeds(number, 1 + self.config.episodes)
+        seeds = drawn(self.config.seed, number + 1, 1 + self.config.episodes)
         optimiser = _copy(state.optimiser)
         optimiser.reseed_rng(seeds[0])
         points = [optimiser.ask() for _ in range(self.config.population)]
         gaits = [self.space.decode(self.space.fold(point)) for point in points]
-        found = self._run(trials, f"generation {number}", [self._scripted, *gaits], seeds[1:])
+        found = self._run(f"generation {number}", [self._scripted, *gaits], seeds[1:])
         reference = Reference.of(found[0])
         judged = [score(episodes, reference) for episodes in found[1:]]
         optimiser.tell([(point, -row["score"]) for point, row in zip(points, judged, strict=True)])
@@ -266,18 +220,18 @@ class _Search:
             rows=(*state.rows, row),
         )  # fmt: skip
 
-    def validate(self, trials: "Trials") -> None:
+    def validate(self) -> None:
         """Judges the middle of the search, unless that is done."""
         rows = self.state.rows
         if rows and "validation_score" not in rows[-1]:
             middle = self.space.fold(self.state.optimiser.mean)
-            self._judge(trials, f"validation {self.state.generation}", middle)
+            self._judge(f"validation {self.state.generation}", middle)
 
-    def _judge(self, trials: "Trials", label: str, point: NDArray[np.float64]) -> None:
+    def _judge(self, label: str, point: NDArray[np.float64]) -> None:
         """Scores a point in the validation's episodes, and keeps it if it is the best."""
         state = self.state
         assert state.reference is not None
-        found = self._run(trials, label, [self.space.decode(point)], self._validation())
+        found = self._run(label, [self.space.decode(point)], self._validation())
         judged, best = score(found[0], state.reference), state.best
         if best is None or judged["score"] > best[0]:
             best = judged["score"], point
@@ -290,48 +244,33 @@ class _Search:
         rows = (*state.rows[:-1], state.rows[-1] | row) if state.rows else ()
         self.state = replace(state, best=best, rows=rows, steps=state.steps + _steps(found))
 
-    def _run(
-        self,
-        trials: "Trials",
-        label: str,
-        gaits: Sequence[tuple[Gait, tuple[float, ...]]],
-        seeds: Sequence[int],
-    ) -> list[list[Headway]]:
+    def _run(self, label: str, gaits: Sequence[Steered], seeds: Sequence[int]) -> Found:
         """Episodes of each gait, one for each seed; those that are known are not run again."""
+        config, n = self.config, len(seeds)
         jobs = [
             Trial(
-                task=self.config.task, gait=gait, steering=steering, seed=seed,
-                randomise=self.config.randomise, settling=self.config.settling,
-                window=self.config.window,
+                task=config.task, gait=gait, steering=steering, seed=seed,
+                randomise=config.randomise, settling=config.settling, window=config.window,
             )
             for gait, steering in gaits
             for seed in seeds
         ]  # fmt: skip
         self.known = {key: value for key, value in self.known.items() if key[0] == label}
         missing = [i for i in range(len(jobs)) if (label, i) not in self.known]
-        for i, headway in trials.run([jobs[i] for i in missing]):
+        for i, headway in self.processes.run(run_trial, [(jobs[i],) for i in missing]):
             self.known[label, missing[i]] = headway
         found = [self.known[label, i] for i in range(len(jobs))]
-        n = len(seeds)
         return [found[i : i + n] for i in range(0, len(found), n)]
 
-    def _seeds(self, number: int, n: int) -> list[int]:
-        random = np.random.default_rng((self.config.seed, number + 1))
-        return random.integers(2**31, size=n).tolist()
-
     def _validation(self) -> list[int]:
-        return self._seeds(-1, self.config.validation_episodes)
+        return drawn(self.config.seed, 0, self.config.validation_episodes)
 
     def shown(self) -> dict[str, str]:
         """What the progress bar says."""
-        row = self.state.rows[-1]
-        best = self.state.best[0] if self.state.best else np.nan
-        return {
-            "generation": f"{self.state.generation}",
-            "best": f"{best:.3f}",
-            "mean": f"{row['score_mean']:.3f}",
-            "speed": f"{1e3 * row['speed_mean_m_per_s']:.2f} mm/s",
-        }
+        row, best = self.state.rows[-1], self.state.best[0] if self.state.best else np.nan
+        shown = {"generation": f"{self.state.generation}", "best": f"{best:.3f}"}
+        speed = f"{1e3 * row['speed_mean_m_per_s']:.2f} mm/s"
+        return shown | {"mean": f"{row['score_mean']:.3f}", "speed": speed}
 
     def policy(self, *, best: bool) -> SavedPolicy:
         """The best gait, or the middle of the search."""
@@ -340,97 +279,21 @@ class _Search:
         if best and state.best is not None:
             point = state.best[1]
         gait, steering = self.space.decode(point)
-        origin = Origin(
-            algorithm="cma", seed=config.seed, steps=state.steps, command=self.command,
-            source=f"CMA-ES from the gait '{config.start}', generation {state.generation}",
-            versions=versions(*LIBRARIES),
-        )  # fmt: skip
+        source = f"CMA-ES from the gait '{config.start}', generation {state.generation}"
+        origin = self.folder.origin("cma", state.steps, source)
         return SavedPolicy(task=config.task, origin=origin, gait=gait, steering=steering)
 
     def save(self) -> None:
         """Writes the state, then what follows from it."""
         self.folder.save((self.state, self.known))
-        self.folder.write_curves({CURVE: self.state.rows})
+        write_csv(self.folder.path / CURVE, self.state.rows)
         self.policy(best=True).save(self.folder.path / BEST)
         self.policy(best=False).save(self.folder.path / LAST)
 
 
-def _steps(found: Sequence[Sequence[Headway]]) -> int:
+def _steps(found: Found) -> int:
     return sum(headway.steps for episodes in found for headway in episodes)
 
 
 def _copy(optimiser: CMA) -> CMA:
     return pickle.loads(pickle.dumps(optimiser))
-
-
-class Trials:
-    """Runs episodes in processes of their own, or in this one if there is only one."""
-
-    def __init__(self, workers: int) -> None:
-        self._n = workers if workers > 1 else 0
-        self._processes: list[BaseProcess] = []
-        self._pipes: list[Any] = []
-
-    def __enter__(self) -> "Trials":
-        # Spawned: nothing of this process, of its threads above all, is carried over. Ctrl-C is
-        # for this process alone; one that is started while it is ignored never hears of it.
-        context = multiprocessing.get_context("spawn")
-        alone = threading.current_thread() is threading.main_thread()
-        before = signal.signal(signal.SIGINT, signal.SIG_IGN) if self._n and alone else None
-        try:
-            for _ in range(self._n):
-                ours, theirs = context.Pipe()
-                process = context.Process(target=_work, args=(theirs,), daemon=True)
-                process.start()
-                theirs.close()
-                self._pipes.append(ours)
-                self._processes.append(process)
-        finally:
-            if before is not None:
-                signal.signal(signal.SIGINT, before)
-        return self
-
-    def __exit__(self, *error: object) -> None:
-        for pipe, process in zip(self._pipes, self._processes, strict=True):
-            process.kill()  # it has nothing to lose
-            pipe.close()
-
-    def run(self, jobs: Sequence[Trial]) -> Iterator[tuple[int, Headway]]:
-        """Yields the number of each job and what came of it, in any order.
-
-        Raises:
-            RuntimeError: If a process has ended.
-        """
-        if not self._n:
-            yield from ((i, run_trial(job)) for i, job in enumerate(jobs))
-            return
-        waiting, free = list(enumerate(jobs))[::-1], list(self._pipes)
-        busy: dict[Any, int] = {}
-        while waiting or busy:
-            try:
-                while free and waiting:
-                    free[-1].send(waiting[-1][1])
-                    busy[free.pop()] = waiting.pop()[0]
-                ready: list[Any] = wait(list(busy))
-                found = [(pipe, pipe.recv()) for pipe in ready]
-            except (EOFError, OSError) as error:
-                raise RuntimeError("a process that ran episodes has ended") from error
-            for pipe, headway in found:
-                if isinstance(headway, Exception):
-                    raise headway
-                free.append(pipe)
-                yield busy.pop(pipe), headway
-
-
-def _work(pipe: Any) -> None:
-    """A process that runs episodes until the other end of its pipe is gone."""
-    try:
-        while True:
-            job = pipe.recv()
-            try:
-                found: Headway | Exception = run_trial(job)
-            except Exception as error:
-                found = error
-            pipe.send(found)
-    except (EOFError, OSError):
-        return

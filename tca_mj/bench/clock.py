@@ -1,8 +1,9 @@
 """Processor time: of a call, of one function inside others, of the physics in a step."""
 
 import time
-from collections.abc import Callable
-from typing import Any, Self
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -23,26 +24,13 @@ def median(call: Callable[[], object], repetitions: int) -> float:
     return float(np.median([taken(call) for _ in range(repetitions)]))
 
 
-class Stopwatch:
-    """Adds up the processor time spent in one function of an object; a context manager."""
+class Timed:
+    """A function that adds up the processor time of its calls, ``seconds`` [s]."""
 
-    def __init__(self, owner: Any, name: str) -> None:
-        self.seconds = 0.0
-        self.plain = getattr(owner, name)
-        self._owner, self._name = owner, name
-        self._own = name in vars(owner)
+    def __init__(self, plain: Callable[..., Any]) -> None:
+        self.seconds, self.plain = 0.0, plain
 
-    def __enter__(self) -> Self:
-        setattr(self._owner, self._name, self._timed)
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        if self._own:
-            setattr(self._owner, self._name, self.plain)
-        else:
-            delattr(self._owner, self._name)
-
-    def _timed(self, *arguments: Any, **named: Any) -> Any:
+    def __call__(self, *arguments: Any, **named: Any) -> Any:
         start = time.thread_time()
         try:
             return self.plain(*arguments, **named)
@@ -50,9 +38,23 @@ class Stopwatch:
             self.seconds += time.thread_time() - start
 
 
-def in_physics() -> Stopwatch:
+@contextmanager
+def stopwatch(owner: Any, name: str) -> Iterator[Timed]:
+    """Times a function of an object while the context lasts."""
+    own, timed = name in vars(owner), Timed(getattr(owner, name))
+    setattr(owner, name, timed)
+    try:
+        yield timed
+    finally:
+        if own:
+            setattr(owner, name, timed.plain)
+        else:
+            delattr(owner, name)
+
+
+def in_physics() -> AbstractContextManager[Timed]:
     """A stopwatch for the calls of ``mj_step``."""
-    return Stopwatch(mujoco, "mj_step")
+    return stopwatch(mujoco, "mj_step")
 
 
 class Replay:

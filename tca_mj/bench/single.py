@@ -16,16 +16,15 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from gymnasium import Wrapper
 from tqdm import tqdm
 
 from tca_mj.agents.policies import Policy
 from tca_mj.agents.policies.actors import arguments_of, scripted
-from tca_mj.bench.clock import Replay, Stopwatch, in_physics, median, taken
+from tca_mj.bench.clock import Replay, Timed, in_physics, median, stopwatch, taken
 from tca_mj.checks import Array, number
 from tca_mj.envs.wrappers import RecordRerun
 from tca_mj.machine import machine, versions
-from tca_mj.pages import made_with, table, write_result
+from tca_mj.pages import made_with, page, table, write_result
 from tca_mj.registry import DEMOS, make
 from tca_mj.tca import CATALOGUE, CoilRods, CoilSurfaces, Heating, Load, LoadedTcas
 from tca_mj.tca.dynamics.banded import solve_course
@@ -83,11 +82,12 @@ def benchmark(
             },
             "episode": _episode(env, policy, steps, bar.update),
             "recording": _recording(env, policy, steps, bar.update),
-            "bank": {"advance": _advance(env.sim, 20 * repetitions)},
+            "bank": {"advance": median(
+                partial(env.sim.bank.advance, env.sim.tca, np.ones(env.sim.n), env.sim.length,
+                        env.sim.tca_period), 20 * repetitions)},
         }  # fmt: skip
     env.close()
-    if out is not None:
-        write_result(out, "benchmark", result, report(result))
+    write_result(out, "benchmark", result, report(result))
     return result
 
 
@@ -98,31 +98,26 @@ def report(result: dict[str, Any]) -> str:
     factors = result["physics"] | {
         f"script, {name}": row["real_time_factor"] for name, row in phases.items()
     }
-    lines = [
-        *made_with(result),
-        "",
+    return page(
+        made_with(result),
         *_tca_report(result["tca"]),
-        "",
         f"Scene of {result['task']}: {model['degrees_of_freedom']} degrees of freedom,"
         f" {model['bodies']} bodies, {model['tcas']} TCAs; time step"
         f" {1e3 * model['timestep']:g} ms, TCAs every {1e3 * model['tca_period']:g} ms,"
         f" control every {1e3 * model['control_period']:g} ms.",
-        "",
-        *table(
+        table(
             ["physics and TCAs, one core",
              f"times real time (aim: {TARGETS['real_time_factor']:g})"],
             ([name, f"{factor:.1f}"] for name, factor in factors.items()),
         ),
-        "",
-        *table(
+        table(
             ["", "env.step", "the mj_steps in it", f"ratio (aim: {TARGETS['step_ratio']:g})",
              "ratio to a bare replay"],
             ([name, f"{1e3 * row['step']:.2f} ms", f"{1e3 * row['inside']:.2f} ms",
               f"{row['ratio']:.3f}", f"{row['replay_ratio']:.3f}"]
              for name, row in {**phases, "all of it": result["episode"]["all"]}.items()),
         ),
-        "",
-        *table(["", ""], [
+        table(["", ""], [
             ["opening a recording", f"{1e3 * recording['opening']:.0f} ms"],
             ["recording a step, caller's thread", f"{1e6 * recording['per_step']:.0f} µs"],
             ["recording, all threads, share of the simulation's time"
@@ -132,8 +127,7 @@ def report(result: dict[str, Any]) -> str:
              f"{1e-3 * recording['bytes_per_second']:.0f} kB per simulated second"],
             [f"bank.advance, {model['tcas']} TCAs", f"{1e6 * bank['advance']:.0f} µs"],
         ]),
-    ]  # fmt: skip
-    return "\n".join(lines)
+    )  # fmt: skip
 
 
 def _tca(scale: float) -> dict[str, float]:
@@ -169,7 +163,7 @@ def _tca(scale: float) -> dict[str, float]:
     return result
 
 
-def _tca_report(tca: dict[str, float]) -> list[str]:
+def _tca_report(tca: dict[str, float]) -> list[list[str]]:
     batches = {
         "rod, tension and slope at a length": ("rod", "rod"),
         "rod, length under a load": ("hanging_length", "rod"),
@@ -183,13 +177,12 @@ def _tca_report(tca: dict[str, float]) -> list[str]:
     moved = {f"{way}, {law}": tca[f"{key}, {law}"]
              for key, way in ways.items() for law in ("rod", "surface")}  # fmt: skip
     return [
-        *table(["10,000 TCAs in one call", "per TCA", "aim"], [
+        table(["10,000 TCAs in one call", "per TCA", "aim"], [
             *([what, f"{1e6 * tca[key]:.3f} µs", f"{1e6 * TARGETS[aim]:g} µs"]
               for what, (key, aim) in batches.items()),
             ["rod over surface", f"{tca['rod'] / tca['surface']:.1f}", ""],
         ]),
-        "",
-        *table(
+        table(
             ["a hanging weight, 1 s in 1 ms steps", "per TCA",
              f"faster than {PUBLISHED:g} s (aim: {TARGETS['dynamics_factor']:,.0f} times)"],
             ([what, f"{1e3 * seconds:.3g} ms", f"{PUBLISHED / seconds:,.0f} times"]
@@ -216,98 +209,59 @@ def _physics(env: Any, hot: bool, repetitions: int, tick: Callable[[], object]) 
 
 
 def _run(
-    env: Any, policy: Policy, observation: Any, steps: int, tick: Callable[[], object]
+    step: Callable[[Any], Any], policy: Policy, seen: Any, steps: int, tick: Callable[[], object]
 ) -> tuple[int, float]:
     """Runs the script from what a reset showed; steps done and processor time it took [s]."""
     policy.reset()
-    deciding = 0.0
-    done = 0
-    while done < steps:
-        start = time.thread_time()
-        action = policy.act(observation)
-        deciding += time.thread_time() - start
-        observation, _, terminated, truncated, _ = env.step(action)
-        done += 1
+    act, done, ended = Timed(policy.act), 0, False
+    while done < steps and not ended:
+        seen, _, terminated, truncated, _ = step(act(seen))
+        done, ended = done + 1, terminated or truncated
         tick()
-        if terminated or truncated:
-            break
-    return done, deciding
-
-
-class _Dissected(Wrapper[Any, Any, Any, Any]):
-    """Measures every step of a task against its own physics steps.
-
-    Attributes:
-        rows: For each step its time, that of a bare replay, of the physics in it and of the
-            simulation in it [s].
-        phases: What the script was doing in it.
-    """
-
-    def __init__(self, env: Any, policy: Policy) -> None:
-        super().__init__(env)
-        self.rows: list[tuple[float, float, float, float]] = []
-        self.phases: list[str] = []
-        self._policy, self._replay = policy, Replay(env.unwrapped)
-
-    def step(self, action: Any) -> Any:
-        task: Any = self.env.unwrapped
-        self._replay.keep()
-        alone = self._replay.seconds() if len(self.rows) % 2 else 0.0
-        with in_physics() as inside, Stopwatch(task.sim, "step") as coupled:
-            start = time.thread_time()
-            result = self.env.step(action)
-            whole = time.thread_time() - start
-        alone = alone or self._replay.seconds()
-        self.rows.append((whole, alone, inside.seconds, coupled.seconds))
-        self.phases.append(self._policy.phase)
-        return result
+    return done, act.seconds
 
 
 def _episode(
     task: Any, policy: Policy, steps: int, tick: Callable[[], object]
 ) -> dict[str, Any]:
     """The scripted episode, every step of it against its own physics steps, by phase."""
-    dissected = _Dissected(task, policy)
+    replay, phases = Replay(task), []
+    rows: list[tuple[float, ...]] = []
+
+    def dissected(action: Any) -> Any:
+        replay.keep()
+        alone, step = replay.seconds() if len(rows) % 2 else 0.0, Timed(task.step)
+        with in_physics() as inside, stopwatch(task.sim, "step") as coupled:
+            result = step(action)
+        alone = alone or replay.seconds()
+        rows.append((step.seconds, alone, inside.seconds, coupled.seconds))
+        phases.append(policy.phase)
+        return result
+
     _run(dissected, policy, task.reset(seed=0)[0], steps, tick)
-    times, names = np.array(dissected.rows), np.array(dissected.phases)
 
     def row(part: Array) -> dict[str, float]:
         step, alone, inside, coupled = part.T
-        return {
-            "step": float(np.median(step)),
-            "inside": float(np.median(inside)),
-            "outside": float(np.median(step - inside)),
-            "ratio": float(np.median(step / inside)),
-            "replay_ratio": float(np.median(step / alone)),
-            "real_time_factor": task.control_period / float(np.median(coupled)),
-        }
+        times = {
+            "step": step, "inside": inside, "outside": step - inside, "ratio": step / inside,
+            "replay_ratio": step / alone, "real_time_factor": task.control_period / coupled,
+        }  # fmt: skip
+        return {name: float(np.median(values)) for name, values in times.items()}
 
-    phases = {name: row(times[names == name]) for name in dict.fromkeys(dissected.phases)}
-    return {"phases": phases, "all": row(times)}
-
-
-class _Clocked(Wrapper[Any, Any, Any, Any]):
-    """Adds up the processor time of the steps below it."""
-
-    seconds = 0.0
-
-    def step(self, action: Any) -> Any:
-        start = time.thread_time()
-        result = self.env.step(action)
-        self.seconds += time.thread_time() - start
-        return result
+    times, names = np.array(rows), np.array(phases)
+    by_phase = {name: row(times[names == name]) for name in dict.fromkeys(phases)}
+    return {"phases": by_phase, "all": row(times)}
 
 
 def _recording(
     task: Any, policy: Policy, steps: int, tick: Callable[[], object]
 ) -> dict[str, float]:
     """What a recording adds to an episode, the work of its threads and its closing included."""
-    clocked = _Clocked(task)
-    with tempfile.TemporaryDirectory() as folder:
-        env = RecordRerun(clocked, Path(folder) / "benchmark.rrd")
-        observation, _ = env.reset(seed=0)
+    with tempfile.TemporaryDirectory() as folder, stopwatch(task, "step") as clocked:
+        env = RecordRerun(task, Path(folder) / "benchmark.rrd")
+        seen, _ = env.reset(seed=0)
         opening, begin = env.seconds, time.process_time()
-        done, deciding = _run(env, policy, observation, steps, tick)
+        done, deciding = _run(env.step, policy, seen, steps, tick)
         env.close()
         everything = time.process_time() - begin
         size = env.path.stat().st_size
@@ -317,9 +271,3 @@ def _recording(
         "share": (everything - deciding - clocked.seconds) / clocked.seconds,
         "bytes_per_second": size / (done * task.control_period),
     }
-
-
-def _advance(sim: Any, repetitions: int) -> float:
-    """Time of one update of all TCAs of a simulation [s]."""
-    power, length = np.ones(sim.n), sim.length
-    return median(lambda: sim.bank.advance(sim.tca, power, length, sim.tca_period), repetitions)

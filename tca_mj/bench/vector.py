@@ -25,12 +25,12 @@ import gymnasium as gym
 import numpy as np
 from tqdm import tqdm
 
-from tca_mj.bench.clock import Replay, Stopwatch, in_physics
+from tca_mj.bench.clock import Replay, in_physics, stopwatch
 from tca_mj.checks import number
 from tca_mj.envs.task import SimulatedTask
 from tca_mj.envs.vector import TaskVector
 from tca_mj.machine import machine, versions
-from tca_mj.pages import made_with, table, write_result
+from tca_mj.pages import made_with, page, table, write_result
 from tca_mj.registry import TASKS, task_class
 
 # What is aimed at: steps per second on two threads over those on one, and on one thread over those
@@ -42,12 +42,8 @@ Times = dict[str, list[float]]
 
 
 def benchmark(
-    *,
-    scale: float = 1.0,
-    out: Path | None = None,
-    ids: Sequence[str] = (),
-    num_envs: int = 32,
-) -> dict[str, Any]:
+    *, scale: float = 1.0, out: Path | None = None, ids: Sequence[str] = (), num_envs: int = 32,
+) -> dict[str, Any]:  # fmt: skip
     """Measures everything, about five minutes.
 
     Args:
@@ -81,8 +77,7 @@ def benchmark(
     with _if_installed("training", result):
         result["training"] = _training(trained, max(int(1024 * scale), 64), min(n, 8))
     result["load"].append(os.getloadavg()[0])
-    if out is not None:
-        write_result(out, "vector", result, report(result))
+    write_result(out, "vector", result, report(result))
     return result
 
 
@@ -92,34 +87,31 @@ def report(result: dict[str, Any]) -> str:
     rates, ratios = [], []
     for id, row in result["tasks"].items():
         single, vector = row["single"], row["vector"]
-        walls = [single["wall"], *(vector[k]["wall"] for k in ("1", "2") if vector)]
+        walls = [single["wall"], *(times["wall"] for times in vector.values())]
         cells = [f"{1.0 / wall:.0f}" for wall in walls] + [""] * (3 - len(walls))
         rates.append([id, *cells, f"{row['physics_steps'] / walls[-1]:,.0f}"])
-        cells = [f"{single['cpu'] / single[name]:.2f}" for name in ("inside", "bare")]
+        pairs = [(single["cpu"], single[name]) for name in ("inside", "bare")]
         if vector:
             one, two = vector["1"], vector["2"]
             shared = one["cpu"] - 0.5 * one["inside"]
-            pairs = ((single["cpu"], one["cpu"]), (one["wall"], two["wall"]), (one["cpu"], shared))
-            cells += [f"{slow / fast:.2f}" for slow, fast in pairs]
+            pairs += [(single["cpu"], one["cpu"]), (one["wall"], two["wall"]), (one["cpu"], shared)]
+        cells = [f"{slow / fast:.2f}" for slow, fast in pairs]
         ratios.append([id, *cells, *[""] * (5 - len(cells))])
-    lines = [
-        *made_with(result),
-        f"{result['num_envs']} tasks of each kind, {result['steps']} steps, of each the fastest of"
-        f" {result['repetitions']}; load of the machine: {load[0]:.1f} before, {load[1]:.1f} after",
-        "",
-        *table(["env steps per second", "single", "vector, 1 thread", "vector, 2 threads",
-                "physics steps per second, 2 threads"], rates),
-        "",
-        *table(["", "single env.step over its mj_steps", "over bare mj_steps",
-                f"one thread, vector over single (aim: {TARGETS['per_thread']:g})",
-                f"2 threads over 1 (aim: {TARGETS['two_threads']:g})", "by processor time"],
-               ratios),
-    ]  # fmt: skip
-    if result["training"]:
-        trained = ([name, f"{rate:.0f}"] for name, rate in result["training"].items())
-        lines += ["", *table(["training with PPO", "frames per second"], trained)]
-    lines += [f"\nLeft out: {name}, {why}" for name, why in result["left_out"].items()]
-    return "\n".join(lines)
+    trained = [[name, f"{rate:.0f}"] for name, rate in result["training"].items()]
+    return page(
+        [*made_with(result),
+         f"{result['num_envs']} tasks of each kind, {result['steps']} steps, of each the fastest of"
+         f" {result['repetitions']}; load of the machine: {load[0]:.1f} before, {load[1]:.1f}"
+         " after"],
+        table(["env steps per second", "single", "vector, 1 thread", "vector, 2 threads",
+               "physics steps per second, 2 threads"], rates),
+        table(["", "single env.step over its mj_steps", "over bare mj_steps",
+               f"one thread, vector over single (aim: {TARGETS['per_thread']:g})",
+               f"2 threads over 1 (aim: {TARGETS['two_threads']:g})", "by processor time"],
+              ratios),
+        table(["training with PPO", "frames per second"], trained) if trained else "",
+        *(f"Left out: {name}, {why}" for name, why in result["left_out"].items()),
+    )  # fmt: skip
 
 
 @contextmanager
@@ -193,9 +185,9 @@ def _vector(envs: TaskVector, actions: Actions) -> Times:
     physics = envs.batch.physics
     for row in actions:
         with (
-            Stopwatch(physics, "step") as step,
-            Stopwatch(physics, "forward") as forward,
-            Stopwatch(envs, "restart") as restart,
+            stopwatch(physics, "step") as step,
+            stopwatch(physics, "forward") as forward,
+            stopwatch(envs, "restart") as restart,
         ):
             _both(partial(envs.step, row), times)
         for clock in ("wall", "cpu"):

@@ -40,13 +40,9 @@ _CABLE = """
 
 
 def cable(
-    bodies: int,
-    *,
-    timestep: float,
-    damping: float,
-    integrator: str = "implicitfast",
+    bodies: int, *, timestep: float, damping: float, integrator: str = "implicitfast",
     scale: float = 1.0,
-) -> mujoco.MjModel | None:
+) -> mujoco.MjModel | None:  # fmt: skip
     """A cable of so many rigid bodies, clamped at its base along z, or None without the plugin.
 
     Args:

@@ -10,8 +10,7 @@ from scipy.spatial.transform import Rotation
 from tca_mj.certify.rest import Load, Rest, rest, run
 from tca_mj.certify.subjects import Limb, Subject, slack
 from tca_mj.checks import Array
-from tca_mj.rod import RodShape, solve_series
-from tca_mj.rod.problem import StrandLaw
+from tca_mj.rod import RodShape, StrandLaw, solve_series
 from tca_mj.tca import law_at
 
 GRAVITY = 9.81  # [m/s²]

@@ -1,7 +1,7 @@
 """Single statements about theory and chain, each computed and held against what is asked."""
 
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -14,7 +14,6 @@ from tca_mj.certify.rest import run
 from tca_mj.certify.subjects import SUBJECTS
 from tca_mj.checks import Array
 from tca_mj.model import settle
-from tca_mj.model.part import Part
 from tca_mj.modules.bending import BendingSpec, bending_module
 from tca_mj.modules.twisting import TwistingSpec
 from tca_mj.rod import BeamSpec, RodShape, solve_static
@@ -81,8 +80,11 @@ def claims() -> list[Claim]:
             *cables()]  # fmt: skip
 
 
-def _errors(chain: RodShape, exact: RodShape) -> tuple[float, float]:
-    """Of the tip over the length, and of its rotation [deg]."""
+def _errors(
+    exact: RodShape, nodes: int, routes: Sequence[Route], tensions: Sequence[float], force: Vector
+) -> tuple[float, float]:
+    """Of the tip of a chain over the length, and of its rotation [deg]."""
+    chain = settle(BODY, routes, tensions, nodes=nodes, tip_force=force)
     turn = Rotation.from_matrix(exact.rotation[-1].T @ chain.rotation[-1])
     away = float(np.linalg.norm(chain.tip - exact.tip)) / BODY.length
     return away, float(np.degrees(turn.magnitude()))
@@ -105,8 +107,7 @@ def bends() -> Iterator[Claim]:
     """The chain at the default nodes against the theory without shear."""
     for what, routes, tensions, force in (*_BENT, ("164°", [_STRAIGHT], [0.04], _NONE)):
         exact = solve_static(BODY, routes, tensions, tip_force=force, shearable=False)
-        chain = settle(BODY, routes, tensions, nodes=NODES, tip_force=force)
-        place, turn = _errors(chain, exact)
+        place, turn = _errors(exact, NODES, routes, tensions, force)
         most = 0.02 if np.degrees(exact.bend_angle) > 90.0 else 0.01
         yield Claim(f"chain, {NODES} nodes", what, f"{100 * most:g} % of L, 1°",
                     f"{100 * place:.2f} %, {turn:.2f}°", place < most and turn < 1.0)  # fmt: skip
@@ -116,10 +117,7 @@ def orders() -> Iterator[Claim]:
     """How the error falls when the nodes are doubled."""
     for what, routes, tensions, force in _BENT:
         exact = solve_static(BODY, routes, tensions, tip_force=force, shearable=False)
-        coarse, fine = (
-            _errors(settle(BODY, routes, tensions, nodes=n, tip_force=force), exact)[0]
-            for n in (NODES, 2 * NODES)
-        )
+        coarse, fine = (_errors(exact, n, routes, tensions, force)[0] for n in (NODES, 2 * NODES))
         ratio = coarse / fine
         yield Claim("order of the chain", what, "3.3 to 4.7", f"{ratio:.2f}", 3.3 < ratio < 4.7)
 
@@ -151,28 +149,32 @@ _TEMPERATURE = np.array([110.0, 60.0, 25.0])
 _STILL = Load(force=np.array([[0.0, 1e-3, 0.0]]), moment=np.zeros((1, 3)), gravity=np.zeros(3))
 
 
-def _changed(change: str) -> Part:
+# What is changed: time step [s], factors on damping and density, armature added [kg m²].
+_CHANGES: Mapping[str, Mapping[str, float]] = {
+    "time step 1 ms for 2 ms": {"timestep": 1e-3}, "time step 5 ms for 2 ms": {"timestep": 5e-3},
+    "three times the damping": {"damping": 3.0}, "armature 1e-9 kg m²": {"armature": 1e-9},
+    "three times the density": {"density": 3.0},
+}  # fmt: skip
+
+
+def _end(
+    *, timestep: float | None = None, damping: float = 1.0, density: float = 1.0,
+    armature: float = 0.0,
+) -> Array:  # fmt: skip
+    """Where the tip of the changed module ends, shape (1, 3) [m]."""
     part = bending_module()
     for joint in part.spec.joints:
-        joint.armature = 1e-9 if change == "armature 1e-9 kg m²" else joint.armature
-        joint.damping = (3.0 if change == "three times the damping" else 1.0) * joint.damping
+        joint.armature, joint.damping = joint.armature + armature, damping * joint.damping
     for geom in part.spec.geoms:
-        geom.mass = (3.0 if change == "three times the density" else 1.0) * geom.mass
-    return part
+        geom.mass *= density
+    return run(part, ["tip"], _TEMPERATURE, _STILL, timestep=timestep)[0].position
 
 
 def invariance() -> Iterator[Claim]:
     """What a simulation at rest must not depend on; and it returns after the heat has gone."""
-
-    def end(change: str = "", timestep: float | None = None) -> Array:
-        return run(_changed(change), ["tip"], _TEMPERATURE, _STILL, timestep=timestep)[0].position
-
-    first, changes = end(), {
-        "time step 1 ms for 2 ms": 1e-3, "time step 5 ms for 2 ms": 5e-3,
-        "three times the damping": None, "armature 1e-9 kg m²": None,
-        "three times the density": None,
-    }  # fmt: skip
-    ways = {what: float(np.linalg.norm(end(what, step) - first)) for what, step in changes.items()}
+    first = _end()
+    ways = {what: float(np.linalg.norm(_end(**change) - first))
+            for what, change in _CHANGES.items()}  # fmt: skip
     ways["heated to 120 °C and cold again"] = _returned()
     for what, way in ways.items():
         error = way / BODY.length

@@ -1,7 +1,7 @@
 """Every case of a module answered by theory and by MuJoCo, and what many of them say together."""
 
 import time
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import nullcontext
 from dataclasses import dataclass
@@ -36,6 +36,9 @@ class Effort(NamedTuple):
     finer: int = 10
     runs: int = 6
     solvers: int = 20
+
+
+FULL = Effort()
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -145,13 +148,9 @@ def _shear(subject: Subject, case: Case, exact: Rest) -> Gap | None:
 
 
 def outcomes(
-    names: Sequence[str],
-    *,
-    effort: Effort = Effort(),  # noqa: B008  (immutable)
-    seed: int = 0,
-    workers: int = 1,
+    names: Sequence[str], *, effort: Effort = FULL, seed: int = 0, workers: int = 1,
     progress: Callable[[], Any] = lambda: None,
-) -> dict[str, list[Outcome]]:
+) -> dict[str, list[Outcome]]:  # fmt: skip
     """Answers the cases of some modules.
 
     Args:
@@ -176,22 +175,3 @@ def _one(task: tuple[str, int], effort: Effort, seed: int) -> Outcome:
     name, number = task
     subject = SUBJECTS[name]()
     return judge(subject, draw(subject, name, number + 1, seed)[-1], number, effort)
-
-
-class Spread(NamedTuple):
-    """Median, 95th percentile and largest of some errors."""
-
-    median: float
-    high: float
-    worst: float
-
-    @classmethod
-    def of(cls, values: Iterable[float]) -> "Spread":
-        """The spread of at least one value."""
-        array = np.array(list(values), dtype=np.float64)
-        return cls(float(np.median(array)), float(np.percentile(array, 95)), float(array.max()))
-
-
-def found(rows: Iterable[Outcome]) -> list[tuple[Outcome, Gap]]:
-    """The outcomes that have a gap, with it."""
-    return [(row, row.gap) for row in rows if row.gap is not None]

@@ -2,7 +2,7 @@
 
 import math
 import time
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -11,14 +11,17 @@ import numpy as np
 from tqdm import tqdm
 
 from tca_mj import pages
+from tca_mj.certify.cases import Gap
 from tca_mj.certify.claims import Claim, claims
-from tca_mj.certify.figures import draw_figures, nodes_of
-from tca_mj.certify.outcomes import POSITION, ROTATION, Effort, Outcome, Spread, found, outcomes
+from tca_mj.certify.outcomes import FULL, POSITION, ROTATION, TIMES, Effort, Outcome, outcomes
 from tca_mj.certify.subjects import SUBJECTS
 from tca_mj.machine import machine, versions
-from tca_mj.validation.figures import need_matplotlib
+from tca_mj.validation.figures import draw, need_matplotlib
 
-_NOTHING = 1e-6  # error below which there is no order to measure [1, rad]
+_NOTHING = 1e-6  # error below which there is no order to measure, and none is drawn [1, rad]
+_FIELDS = ("position", "rotation")
+_SHADES = {"hanging": "#0072b2", "lying": "#d55e00", "standing": "#8a4fa3"}
+_COLOURS = ("#0072b2", "#d55e00", "#009e73", "#8a4fa3", "#56b4e9", "#b8860b", "#555555")
 _FIGURES = {
     "bend": "Error of the tip's place and rotation over its bend, at the default nodes. Dashed:"
     " 1 % of the length and 2°.",
@@ -27,13 +30,9 @@ _FIGURES = {
 
 
 def certify(
-    names: Sequence[str] = (),
-    *,
-    out: Path | None = None,
-    effort: Effort = Effort(),  # noqa: B008  (immutable)
-    seed: int = 0,
+    names: Sequence[str] = (), *, out: Path | None = None, effort: Effort = FULL, seed: int = 0,
     workers: int | None = None,
-) -> dict[str, Any]:
+) -> dict[str, Any]:  # fmt: skip
     """Certifies modules, all of them within three minutes on two cores.
 
     Args:
@@ -75,18 +74,15 @@ def certify(
     if out is not None:
         out.mkdir(parents=True, exist_ok=True)
         draw_figures(rows, out)
-        page = report(rows, single, result, pictures="")
-        pages.write_result(out, "report", result, page, indent=1)
+    page = report(rows, single, result, pictures="")
+    pages.write_result(out, "report", result, page, indent=1)
     return result | {"text": report(rows, single, result)}
 
 
 def report(
-    rows: dict[str, list[Outcome]],
-    single: Sequence[Claim],
-    result: dict[str, Any],
-    *,
+    rows: dict[str, list[Outcome]], single: Sequence[Claim], result: dict[str, Any], *,
     pictures: str | None = None,
-) -> str:
+) -> str:  # fmt: skip
     """The certificate as Markdown.
 
     Args:
@@ -96,48 +92,40 @@ def report(
         pictures: Path of the folder of the figures as seen from the text, with a slash at its end
             if it is another one; None for no figures.
     """
-    lines = [
-        *pages.made_with(result), "",
+    drawn = {name: "" if pictures is None
+             else pages.picture(caption, f"{pictures}accuracy_{name}.png")
+             for name, caption in _FIGURES.items()}  # fmt: skip
+    return pages.page(
+        pages.made_with(result),
         f"{result['effort']['cases']} cases per module, seed {result['seed']}:"
-        f" {result['seconds']['processor']:.0f} s of processor time.", "",
-        "## Modules at their default nodes", "", *_table(rows), "", *_remarks(rows), "",
-        *_picture("bend", pictures),
-        "## Order", "", *_orders(rows), "", *_picture("nodes", pictures),
-        "## Checks of theory and simulation", "", *_checks(rows), "",
-    ]  # fmt: skip
-    if single:
-        lines += ["## Single claims", "", *_claims(single), ""]
-    return "\n".join(lines).rstrip()
-
-
-def _picture(name: str, pictures: str | None) -> list[str]:
-    if pictures is None:
-        return []
-    return pages.picture(_FIGURES[name], f"{pictures}accuracy_{name}.png")
+        f" {result['seconds']['processor']:.0f} s of processor time.",
+        "## Modules at their default nodes", _table(rows), _remarks(rows), drawn["bend"],
+        "## Order", _orders(rows), drawn["nodes"],
+        "## Checks of theory and simulation", _checks(rows),
+        *(["## Single claims", _claims(single)] if single else ()),
+    )  # fmt: skip
 
 
 def _table(rows: dict[str, list[Outcome]]) -> list[str]:
     lines = []
     for name, every in rows.items():
-        subject = SUBJECTS[name]()
-        for posture in ("hanging", "lying", "standing"):
+        for posture in _SHADES:
             here = [row for row in every if row.posture == posture]
-            gaps = [gap for _, gap in found(here)]
-            verdict = "**no**"
-            if gaps:
-                verdict = "yes" if within(here) else f"**no**{_needed(max(subject.nodes), here)}"
-            columns = zip(*((100.0 * gap.position, np.degrees(gap.rotation), 1e3 * gap.strain,
-                             1e3 * gap.tension) for gap in gaps), strict=True)  # fmt: skip
+            if not here:
+                continue
+            verdict = "yes" if within(here) else f"**no**{_needed(name, here)}"
+            errors = [(100.0 * gap.position, np.degrees(gap.rotation), 1e3 * gap.strain,
+                       1e3 * gap.tension) for _, gap in _found(here)]  # fmt: skip
+            columns = zip(*errors, strict=True)
             cells = [_spread(values) for values in columns] or ["-"] * 4
-            if here:
-                lines.append([name, nodes_of(name), posture, f"{len(here)}", *cells, verdict])
+            lines.append([name, _nodes_of(name), posture, f"{len(here)}", *cells, verdict])
     heads = ["module", "nodes", "base", "cases", "tip [% of L]: median, 95 %, worst",
              "rotation [°]", "TCA length [‰]", "tension [mN]", "within 1 %, 2°"]  # fmt: skip
     return pages.table(heads, lines)
 
 
-def _spread(values: Iterable[float]) -> str:
-    return ", ".join(f"{each:.2f}" for each in Spread.of(values))
+def _spread(values: Sequence[float]) -> str:
+    return ", ".join(f"{each:.2f}" for each in np.percentile(values, [50.0, 95.0, 100.0]))
 
 
 def within(rows: Iterable[Outcome]) -> bool:
@@ -146,16 +134,18 @@ def within(rows: Iterable[Outcome]) -> bool:
     return all(gap and gap.position < POSITION and gap.rotation < ROTATION for gap in gaps)
 
 
-def _needed(nodes: int, rows: Sequence[Outcome]) -> str:
+def _needed(name: str, rows: Sequence[Outcome]) -> str:
     """How many nodes second order asks for."""
-    excess = max(max(gap.position / POSITION, gap.rotation / ROTATION) for _, gap in found(rows))
+    gaps = (gap for _, gap in _found(rows))
+    excess = max((max(gap.position / POSITION, gap.rotation / ROTATION) for gap in gaps), default=0)
+    nodes = max(SUBJECTS[name]().nodes)
     return f": {math.ceil(nodes * math.sqrt(excess))} nodes" if excess > 1.0 else ""
 
 
 def _remarks(rows: dict[str, list[Outcome]]) -> Iterator[str]:
     """The worst cases, and those without an answer or with another one."""
     for name, every in rows.items():
-        answered = found(every)
+        answered = _found(every)
         if not answered:
             yield f"* *{name}*: no case was answered."
             continue
@@ -191,25 +181,24 @@ def _ratios(rows: Iterable[Outcome], field: str) -> tuple[list[float], list[floa
         rows: Outcomes.
         field: "position" or "rotation".
     """
-    finer = [[getattr(each, field) for each in row.finer] for row in rows if row.finer]
-    kept = [errors for errors in finer if errors[-1] > _NOTHING]
+    kept = [errors for errors in _finer(rows, field) if errors[-1] > _NOTHING]
     return [one / two for one, two, _ in kept], [two / four for _, two, four in kept]
+
+
+def _finer(rows: Iterable[Outcome], field: str) -> list[list[float]]:
+    return [[getattr(each, field) for each in finer] for finer in _known(rows, "finer")]
 
 
 def _orders(rows: dict[str, list[Outcome]]) -> list[str]:
     lines = []
     for name, every in rows.items():
-        nodes, cells, count = SUBJECTS[name]().nodes[0], [], 0
-        for field in ("position", "rotation"):
-            pair = _ratios(every, field)
-            count = max(count, len(pair[0]))
-            if not pair[0]:
-                cells += ["-", "-", "-"]
-                continue
-            cells += [f"{np.median(each):.2f} ({min(each):.2f} to {max(each):.2f})"
-                      for each in pair]  # fmt: skip
-            cells.append(f"{np.log2(np.median(pair[1])):.2f}")
-        lines.append([name, f"{nodes}, {2 * nodes}, {4 * nodes}", f"{count}", *cells])
+        nodes, pairs = SUBJECTS[name]().nodes[0], [_ratios(every, field) for field in _FIELDS]
+        count = max(len(coarse) for coarse, _ in pairs)
+        lines.append([name, f"{nodes}, {2 * nodes}, {4 * nodes}", f"{count}"])
+        for pair in pairs:
+            lines[-1] += [f"{np.median(each):.2f} ({min(each):.2f} to {max(each):.2f})"
+                          if each else "-" for each in pair]  # fmt: skip
+            lines[-1].append(f"{np.log2(np.median(pair[1])):.2f}" if pair[1] else "-")
     heads = ["module", "nodes", "cases", "tip: N to 2 N, median (range)", "2 N to 4 N", "order",
              "rotation: N to 2 N", "2 N to 4 N", "order"]  # fmt: skip
     return pages.table(heads, lines)
@@ -218,11 +207,8 @@ def _orders(rows: dict[str, list[Outcome]]) -> list[str]:
 def _checks(rows: dict[str, list[Outcome]]) -> list[str]:
     lines = []
     for name, every in rows.items():
-        solvers = [row.solvers for row in every if row.solvers is not None]
-        shear = [100.0 * row.shear.position for row in every if row.shear is not None]
-        run = [100.0 * row.run.position for row in every if row.run is not None]
-        velocity = [row.velocity for row in every if row.velocity is not None]
-        split = [row.split for row in every if row.split is not None]
+        solvers, velocity, split = (_known(every, k) for k in ("solvers", "velocity", "split"))
+        shear, run = ([100.0 * gap.position for gap in _known(every, k)] for k in ("shear", "run"))
         apart = f"{max(solvers):.0e} ({len(solvers)} cases)" if solvers else "-"
         if split:
             apart += (f"; in {len(split)} each found one of two states, and the chain has the"
@@ -244,3 +230,70 @@ def _claims(single: Sequence[Claim]) -> list[str]:
     rows = ([claim.group, claim.what, claim.asked, claim.found, words[claim.held]]
             for claim in single)  # fmt: skip
     return pages.table(["", "case", "asked", "found", ""], rows)
+
+
+def draw_figures(rows: Mapping[str, Sequence[Outcome]], out: Path) -> None:
+    """Draws ``accuracy_bend.png`` and ``accuracy_nodes.png`` into a folder that exists."""
+    draw(out / "accuracy_bend.png", max(4.2, 2.7 * len(rows)), 5.2, lambda f: _bend(f, rows))
+    draw(out / "accuracy_nodes.png", 9.0, 4.4, lambda f: _nodes(f, rows))
+
+
+def _bend(figure: Any, rows: Mapping[str, Sequence[Outcome]]) -> None:
+    """Error over bend."""
+    axes = figure.subplots(2, len(rows), squeeze=False, sharey="row")
+    for (above, below), (name, every) in zip(axes.T, rows.items(), strict=True):
+        for posture, shade in _SHADES.items():
+            for loaded, face in ((True, shade), (False, "none")):
+                some = [(row, gap) for row, gap in _found(every)
+                        if row.posture == posture and (row.force > 0.0) == loaded]  # fmt: skip
+                angle = [np.degrees(row.bend or 0.0) for row, _ in some]
+                style = {"s": 16, "edgecolors": shade, "facecolors": face, "linewidths": 1.0}
+                above.scatter(angle, [100.0 * gap.position for _, gap in some], **style)
+                below.scatter(angle, [np.degrees(gap.rotation) for _, gap in some], **style)
+        for axis, limit in ((above, 100.0 * POSITION), (below, np.degrees(ROTATION))):
+            axis.axhline(limit, color="#666666", lw=1, ls="--")
+        above.set(title=f"{name}, {_nodes_of(name)} nodes")
+        below.set(xlabel="bend [°]")
+    first = axes[0, 0]
+    first.set(ylabel="error of the tip [% of L]", ylim=(0.0, None))
+    axes[1, 0].set(ylabel="error of its rotation [°]", ylim=(0.0, None))
+    for posture, shade in _SHADES.items():
+        first.scatter([], [], s=16, color=shade, label=posture)
+    first.scatter([], [], s=16, edgecolors="#555555", facecolors="none", label="no load")
+    figure.legend(loc="outside lower center", ncols=4)
+
+
+def _nodes(figure: Any, rows: Mapping[str, Sequence[Outcome]]) -> None:
+    """Error over the number of nodes."""
+    axes = figure.subplots(1, 2)
+    labels = "error of the tip [1/L]", "error of its rotation [rad]"
+    for axis, field, label in zip(axes, _FIELDS, labels, strict=True):
+        for colour, (name, every) in zip(_COLOURS, rows.items(), strict=False):
+            nodes = np.array(TIMES) * SUBJECTS[name]().nodes[0]
+            errors = np.array([each for each in _finer(every, field) if max(each) > _NOTHING])
+            if errors.size:
+                drawn = np.maximum(errors, _NOTHING)
+                axis.plot(nodes, drawn.T, "-", color=colour, lw=0.6, alpha=0.4)
+                axis.plot(nodes, np.median(errors, axis=0), "o-", color=colour, label=name)
+        wide = np.array([8.0, 64.0])
+        axis.plot(wide, 3e-3 * (8.0 / wide) ** 2, "k--", lw=1, label="second order")
+        axis.set(xscale="log", yscale="log", xlabel="nodes of a module", ylabel=label)
+        axis.set_xticks([8, 16, 32, 64], labels=["8", "16", "32", "64"])
+        axis.minorticks_off()
+    axes[0].legend()
+
+
+def _nodes_of(name: str) -> str:
+    """The default nodes of a module, from base to tip."""
+    return " + ".join(str(nodes) for nodes in SUBJECTS[name]().nodes)
+
+
+def _known(rows: Iterable[Outcome], field: str) -> list[Any]:
+    """A field of the outcomes that have it."""
+    values = (getattr(row, field) for row in rows)
+    return [value for value in values if value is not None]
+
+
+def _found(rows: Iterable[Outcome]) -> list[tuple[Outcome, Gap]]:
+    """The outcomes that have a gap, with it."""
+    return [(row, row.gap) for row in rows if row.gap is not None]

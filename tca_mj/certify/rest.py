@@ -8,6 +8,7 @@ user does: a ``Simulation`` is heated from the cold and left alone.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
@@ -46,8 +47,7 @@ class Load:
     gravity: Array
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Rest:
+class Rest(NamedTuple):
     """A part at rest.
 
     Attributes:
@@ -64,13 +64,9 @@ class Rest:
 
 
 def rest(
-    part: Part,
-    tips: Sequence[str],
-    laws: Sequence[StrandLaw],
-    load: Load,
-    *,
+    part: Part, tips: Sequence[str], laws: Sequence[StrandLaw], load: Load, *,
     start: Mapping[str, float] | None = None,
-) -> Rest:
+) -> Rest:  # fmt: skip
     """Rest of a part whose TCAs follow laws.
 
     A body that buckles has several. Found is the one to which it sinks from the unloaded shape,
@@ -99,13 +95,9 @@ def rest(
 
 
 def run(
-    part: Part,
-    tips: Sequence[str],
-    temperature: Array,
-    load: Load,
-    *,
+    part: Part, tips: Sequence[str], temperature: Array, load: Load, *,
     timestep: float | None = None,
-) -> tuple[Rest, float]:
+) -> tuple[Rest, float]:  # fmt: skip
     """What a user sees: a simulation with its own settings, heated in two seconds and left alone.
 
     Args:

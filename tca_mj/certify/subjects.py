@@ -7,15 +7,14 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from types import MappingProxyType
-from typing import Any
+from typing import Any, NamedTuple
 
 from tca_mj.model.part import Part
 from tca_mj.modules.bending import BendingSpec, bending_module
 from tca_mj.modules.finger import FingerPairSpec, finger_pair
 from tca_mj.modules.twisting import TwistingSpec, twisting_module
 from tca_mj.robots.arm import ArmSpec, arm
-from tca_mj.rod import BeamSpec, Segment
-from tca_mj.rod.problem import StrandLaw
+from tca_mj.rod import BeamSpec, Segment, StrandLaw
 from tca_mj.routes import Route, parallel
 from tca_mj.tca import TcaSpec
 
@@ -26,8 +25,7 @@ _FINGERS = (
 )
 _DOWN = ((1.0, 0.0, 0.0), (0.0, -1.0, 0.0), (0.0, 0.0, -1.0))  # axes of the arm's base
 
-@dataclass(frozen=True, slots=True)
-class Limb:
+class Limb(NamedTuple):
     """Soft bodies in series from the base to one tip, as theory sees them.
 
     Attributes:
@@ -119,8 +117,7 @@ def _module(
 
 
 def _bending(spec: BendingSpec) -> Subject:
-    what = f"bending module, {spec.count} parallel TCAs"
-    routes = parallel(spec.count, spec.offset)
+    what, routes = f"bending module, {spec.count} parallel TCAs", parallel(spec.count, spec.offset)
     return _module(bending_module, spec, routes, what, force=5e-3, moment=2e-5)
 
 

@@ -6,6 +6,7 @@ An argument that its type refuses ends the program with code 2 and the reason.
 import argparse
 import os
 from collections.abc import Callable
+from functools import partial
 from inspect import cleandoc
 from pathlib import Path
 from typing import Any, TypeAlias
@@ -19,13 +20,9 @@ Commands: TypeAlias = "argparse._SubParsersAction[argparse.ArgumentParser]"
 
 
 def add_command(
-    commands: Commands,
-    name: str,
-    run: Callable[[argparse.Namespace], int],
-    *,
-    help: str,
+    commands: Commands, name: str, run: Callable[[argparse.Namespace], int], *, help: str,
     extra: str = "",
-) -> argparse.ArgumentParser:
+) -> argparse.ArgumentParser:  # fmt: skip
     """Adds a command, still without arguments.
 
     Args:
@@ -59,21 +56,16 @@ def filled(text: str) -> str:
     return text.format(task=TASKS[0].id, demo=next(iter(DEMOS)))
 
 
-def parse_seed(text: str) -> int:
-    """A whole number of at least 0."""
+def parse_seed(text: str, *, least: int = 0) -> int:
+    """A whole number of at least 0, or ``least``."""
     if not text.strip().lstrip("-").isdecimal():
         raise argparse.ArgumentTypeError(f"must be a whole number, got {text!r}")
-    value = int(text)
-    if value < 0:
-        raise argparse.ArgumentTypeError(f"must be at least 0, got {value}")
-    return value
-
-
-def parse_count(text: str) -> int:
-    """A whole number of at least 1."""
-    if parse_seed(text) < 1:
-        raise argparse.ArgumentTypeError(f"must be at least 1, got {text}")
+    if int(text) < least:
+        raise argparse.ArgumentTypeError(f"must be at least {least}, got {int(text)}")
     return int(text)
+
+
+parse_count = partial(parse_seed, least=1)
 
 
 def parse_task(text: str) -> str:

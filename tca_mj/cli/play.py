@@ -136,27 +136,18 @@ def _view(arguments: argparse.Namespace) -> int:
       tca-mj view {task}
       tca-mj view {task} --policy random --seed 1
     """
-    from tca_mj.envs.viewer import NoDisplay, launch, need_display
+    from tca_mj.envs.viewer import NoDisplay, ViewerPolicy, launch, need_display
 
     try:
         need_display()
     except NoDisplay as error:
         print(_NO_DISPLAY.format(reason=error, task=arguments.task), file=sys.stderr)
         return 2
-    from tca_mj.agents.policies.actors import arguments_of
+    from tca_mj.agents.policies.actors import actor, arguments_of
 
     env = make(arguments.task, **arguments_of(arguments.policy, arguments.task))
-    policy = _policy(arguments.policy, env, arguments.seed)
-    options = dict(arguments.options) or None
+    found = actor(arguments.policy, env, seed=arguments.seed)
     print("space starts and pauses, backspace begins the next episode, F1 lists all keys")
-    launch(env, policy, seed=arguments.seed, options=options, title=arguments.task)
+    launch(env, ViewerPolicy(found.act, found.reset), seed=arguments.seed,
+           options=dict(arguments.options) or None, title=arguments.task)  # fmt: skip
     return 0
-
-
-def _policy(name: str, env: Any, seed: int) -> Any:
-    """A policy for the viewer."""
-    from tca_mj.agents.policies.actors import actor
-    from tca_mj.envs.viewer import ViewerPolicy
-
-    found = actor(name, env, seed=seed)
-    return ViewerPolicy(found.act, found.reset)

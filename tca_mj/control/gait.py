@@ -12,14 +12,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tca_mj.checks import Array, floats, require_positive, within
+from tca_mj.checks import Array, Checked, Positive, floats, within
 
 Row = tuple[float, ...]
 Rows = Row | tuple[Row, ...]
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
-class Gait:
+class Gait(Checked):
     """One cycle of all legs.
 
     ``start``, ``duty``, ``hot`` and ``warm`` are a row of one number for each TCA of a leg, which
@@ -37,7 +37,7 @@ class Gait:
         ValueError: If numbers are missing, not finite or out of range.
     """
 
-    period: float
+    period: Positive
     offset: Row
     start: Rows
     duty: Rows
@@ -45,16 +45,15 @@ class Gait:
     warm: Rows
 
     def __post_init__(self) -> None:
-        require_positive(period=self.period)
+        Checked.__post_init__(self)
+        if _table("offset", self.offset).ndim != 1:
+            raise ValueError(f"offset must be a row of finite numbers, got {self.offset}")
         tcas = _table("start", self.start).shape[-1]
-        for name in ("offset", "start", "duty", "hot", "warm"):
+        for name in ("start", "duty", "hot", "warm"):
             value = _table(name, getattr(self, name))
-            if name == "offset":
-                if value.ndim != 1:
-                    raise ValueError(f"offset must be a row of finite numbers, got {self.offset}")
-            elif value.shape[-1] != tcas:
+            if value.shape[-1] != tcas:
                 raise ValueError(f"{name} must have {tcas} numbers per leg, got {value.shape[-1]}")
-            elif value.ndim == 2 and len(value) != self.legs:
+            if value.ndim == 2 and len(value) != self.legs:
                 raise ValueError(f"{name} must have 1 or {self.legs} rows, got {len(value)}")
         within("duty", self.duty, at_least=0.0, at_most=1.0)
         if not (np.array(self.warm) <= np.array(self.hot)).all():

@@ -15,7 +15,7 @@ from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from typing import NamedTuple
 
-from tca_mj.checks import number, require_positive
+from tca_mj.checks import Checked, NotNegative, Positive, number, require_positive
 from tca_mj.control.pi import PiSpec, PiState, pi_rest, pi_step
 
 # A module is steady when it turns less than this in 20 s, Sun, Section 6.2.1 [rad].
@@ -36,7 +36,7 @@ class Phase(StrEnum):
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
-class OpenLoop:
+class OpenLoop(Checked):
     """A constant voltage, for as long as the module takes to settle (Sun, Section 6.2.1).
 
     Attributes:
@@ -48,15 +48,12 @@ class OpenLoop:
         ValueError: If a number is not finite and positive.
     """
 
-    voltage: float
-    settle_time: float = 300.0
-
-    def __post_init__(self) -> None:
-        require_positive(voltage=self.voltage, settle_time=self.settle_time)
+    voltage: Positive
+    settle_time: Positive = 300.0
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
-class ClosedLoop:
+class ClosedLoop(Checked):
     """PI control of the angle that the TCA senses by its own resistance (Sun, Section 6.2.2).
 
     Attributes:
@@ -72,10 +69,10 @@ class ClosedLoop:
 
     pi: PiSpec
     angle_of: Callable[[float], float]
-    tolerance: float = TOLERANCE
+    tolerance: Positive = TOLERANCE
 
     def __post_init__(self) -> None:
-        require_positive(tolerance=self.tolerance)
+        Checked.__post_init__(self)
         number("lowest power of pi", self.pi.lowest, at_least=0.0, unit="W")
         number("highest power of pi", self.pi.highest, unit="W")
 
@@ -142,7 +139,7 @@ class MorphState:
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
-class MorphSequence:
+class MorphSequence(Checked):
     """The phases as data: voltages, thresholds and times.
 
     Attributes:
@@ -176,34 +173,28 @@ class MorphSequence:
     """
 
     drive: OpenLoop | ClosedLoop
-    heat_voltage: float = 25.0
-    hold_voltage: float = 9.5
+    heat_voltage: Positive = 25.0
+    hold_voltage: NotNegative = 9.5
     soft_temperature: float = 110.0
     rigid_temperature: float = 80.0
-    margin: float = 6.0
+    margin: Positive = 6.0
     highest_temperature: float = 160.0
-    hold_time: float = 10.0
-    average_time: float = 1.5
-    fading_time: float = 0.0
-    release_time: float = 180.0
+    hold_time: Positive = 10.0
+    average_time: Positive = 1.5
+    fading_time: NotNegative = 0.0
+    release_time: Positive = 180.0
     fan: bool = True
-    soften_limit: float = 15.0
-    morph_limit: float = 60.0
-    hold_limit: float = 60.0
-    harden_limit: float = 120.0
+    soften_limit: Positive = 15.0
+    morph_limit: Positive = 60.0
+    hold_limit: Positive = 60.0
+    harden_limit: Positive = 120.0
 
     def __post_init__(self) -> None:
-        require_positive(
-            heat_voltage=self.heat_voltage, margin=self.margin, hold_time=self.hold_time,
-            average_time=self.average_time, release_time=self.release_time,
-            soften_limit=self.soften_limit, morph_limit=self.morph_limit,
-            hold_limit=self.hold_limit, harden_limit=self.harden_limit,
-        )  # fmt: skip
-        number("hold_voltage", self.hold_voltage, at_least=0.0, below=self.heat_voltage, unit="V")
+        Checked.__post_init__(self)
+        number("hold_voltage", self.hold_voltage, below=self.heat_voltage, unit="V")
         soft, hot = self.soft_temperature, self.soft_temperature + self.margin
         number("rigid_temperature", self.rigid_temperature, above=-273.15, below=soft, unit="°C")
         number("highest_temperature", self.highest_temperature, above=hot, unit="°C")
-        number("fading_time", self.fading_time, at_least=0.0, unit="s")
         number("hold_limit", self.hold_limit, above=self.hold_time, unit="s")
 
     def start(self, target: float | None) -> MorphState:

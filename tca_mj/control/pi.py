@@ -11,15 +11,16 @@ does not jump.
 
 import math
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tca_mj.checks import Array, require_positive, within
+from tca_mj.checks import Array, Checked, NotNegatives, require_positive, within
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
-class PiSpec:
+class PiSpec(Checked):
     """Gains and limits, scalars or arrays that broadcast with the errors (..., n).
 
     Attributes:
@@ -32,19 +33,18 @@ class PiSpec:
         near_integral: K_I from then on; None is the same as before.
     """
 
-    proportional: float | Array
-    integral: float | Array = 0.0
-    lowest: float | Array = 0.0
+    proportional: NotNegatives
+    integral: NotNegatives = 0.0
+    lowest: Annotated[float | Array, within] = 0.0
     highest: float | Array = math.inf
-    near: float | Array = 0.0
-    near_proportional: float | Array = 0.0
+    near: NotNegatives = 0.0
+    near_proportional: NotNegatives = 0.0
     near_integral: float | Array | None = None
 
     def __post_init__(self) -> None:
-        for name in ("proportional", "integral", "near", "near_proportional", "near_integral"):
-            if (value := getattr(self, name)) is not None:
-                within(name, value, at_least=0.0)
-        within("lowest", self.lowest)
+        Checked.__post_init__(self)
+        if self.near_integral is not None:
+            within("near_integral", self.near_integral, at_least=0.0)
         if not np.all(np.asarray(self.lowest) < self.highest):
             raise ValueError(f"highest must be above lowest {self.lowest}, got {self.highest}")
 

@@ -174,14 +174,11 @@ class _LoadedChain:
         # MuJoCo's spatial forces are about the centre of mass of the whole tree.
         moment, force = self._unit * data.cfrc_int[ids[0]].reshape(2, 3)
         return RodShape(
-            position=data.xpos[ids] + reach[:, None] * rotation[:, :, 2],
-            rotation=rotation,
-            arc_length=chain.points.copy(),
-            strain=_strain(strained.motion, chain),
-            tca_length=strained.length + self._more,
-            base_force=force,
+            position=data.xpos[ids] + reach[:, None] * rotation[:, :, 2], rotation=rotation,
+            arc_length=chain.points.copy(), strain=_strain(strained.motion, chain),
+            tca_length=strained.length + self._more, base_force=force,
             base_moment=moment + np.cross(data.subtree_com[model.body_rootid[ids[0]]], force),
-        )
+        )  # fmt: skip
 
 
 def _in_units(beam: BeamSpec, unit: float) -> BeamSpec:

@@ -128,8 +128,7 @@ def add_chain(
     length = cell if half_turn == 0.0 else cell * float(np.tan(half_turn)) / half_turn
     look = surface(friction, conaffinity=int(collide), rgba=list(rgba))
     mass = spec.mass / nodes
-    springs = (spec.stretching, *spec.bending, spec.torsion)
-    stiffness = dict(zip(MOTIONS, springs, strict=True))
+    stiffness = dict(zip(MOTIONS, (spec.stretching, *spec.bending, spec.torsion), strict=True))
 
     piece = parent.add_body(name=f"{name}.piece0", pos=list(pos), quat=list(quat))
     _add_skin(piece, f"{name}.skin0", length / 2.0, spec.outline, mass=0.5 * mass, **look)
@@ -165,13 +164,10 @@ def _add_joint(
 ) -> None:
     hinge = motion != "stretch"
     body.add_joint(
-        name=name,
-        type=mujoco.mjtJoint.mjJNT_HINGE if hinge else mujoco.mjtJoint.mjJNT_SLIDE,
-        axis=list(_AXIS[motion]),
-        stiffness=[stiffness, 0.0, 0.0],
-        damping=[time * stiffness, 0.0, 0.0],
-        springref=rest[_REFERENCE[motion]] if hinge else 0.0,
-    )
+        name=name, type=mujoco.mjtJoint.mjJNT_HINGE if hinge else mujoco.mjtJoint.mjJNT_SLIDE,
+        axis=list(_AXIS[motion]), stiffness=[stiffness, 0.0, 0.0],
+        damping=[time * stiffness, 0.0, 0.0], springref=rest[_REFERENCE[motion]] if hinge else 0.0,
+    )  # fmt: skip
 
 
 def _add_skin(

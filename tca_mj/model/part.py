@@ -47,9 +47,8 @@ class Part:
             raise ValueError(f"to must be a site of this part, one of {known}, got {to!r}")
         tcas = tuple(tca.renamed(f"{prefix}.") for tca in child.tcas)
         spines = tuple(spine.renamed(f"{prefix}.") for spine in child.spines)
-        mine: Sequence[RoutedTca | RoutedSpine] = (*self.tcas, *self.spines)
-        added: Sequence[RoutedTca | RoutedSpine] = (*tcas, *spines)
-        clash = sorted({item.name for item in added} & {item.name for item in mine})
+        mine = {tca.name for tca in self.tcas} | {spine.name for spine in self.spines}
+        clash = sorted(mine & ({tca.name for tca in tcas} | {spine.name for spine in spines}))
         if clash:
             raise ValueError(f"prefix must make new names, got {prefix!r}: {clash} exist already")
         self.spec.attach(child.spec, site=site, prefix=f"{prefix}.")

@@ -113,9 +113,8 @@ class SmoothBody:
 
     def gather(self, bodies: Sequence["SmoothBody"]) -> None:
         """Takes stiffness, rest and damping over from the bodies of the batch."""
-        self.stiffness = np.stack([body.stiffness for body in bodies])
-        self.rest = np.stack([body.rest for body in bodies])
-        self.damping = np.stack([body.damping for body in bodies])
+        for name in ("stiffness", "rest", "damping"):
+            setattr(self, name, np.stack([getattr(body, name) for body in bodies]))
 
     def _read_cells(self, cells: Sequence[dict[Motion, str]]) -> None:
         """Which joint is which motion of which cell."""

@@ -75,9 +75,8 @@ class Spines:
             every._body = body
             every.bank = copy(every.bank)
             every.bank.heater = stacked([spines.bank.heater for spines in many])
-            every.state = stacked([spines.state for spines in many])
-            every.damaged = np.stack([spines.damaged for spines in many])
-            every.voltage = np.stack([spines.voltage for spines in many])
+            for name in ("state", "damaged", "voltage"):
+                setattr(every, name, stacked([getattr(spines, name) for spines in many]))
         return every
 
     def give_back(self, i: int, one: "Spines") -> None:
@@ -122,14 +121,9 @@ class Spines:
         return np.full(self.n, volts), np.full(self.n, blown)
 
     def advance(
-        self,
-        voltage: Array,
-        fan: NDArray[np.bool_],
-        motion: Array,
-        tension: Array,
-        tension_rate: Array,
-        dt: float,
-    ) -> None:
+        self, voltage: Array, fan: NDArray[np.bool_], motion: Array, tension: Array,
+        tension_rate: Array, dt: float,
+    ) -> None:  # fmt: skip
         """Heats the spines for ``dt`` and sets the springs of their cells.
 
         Args:
@@ -146,12 +140,10 @@ class Spines:
         self.state = self.bank.advance(self.state, voltage, fan, self._angles(motion), dt)
         now = self.state.heat.temperature
         flags = flag_damage(
-            modulus=self.bank.smp.modulus(now),
-            cooling=now < before,
+            modulus=self.bank.smp.modulus(now), cooling=now < before,
             tension=np.maximum(tension.take(self._tca, axis=-1), 0.0),
-            bending_rate=self._rate * tension_rate.take(self._tca, axis=-1),
-            spec=self._damage,
-        )
+            bending_rate=self._rate * tension_rate.take(self._tca, axis=-1), spec=self._damage,
+        )  # fmt: skip
         self.damaged = self.damaged | flags.damaged
         self._stiffen(self.state)
 

@@ -140,15 +140,13 @@ def route_tca(
             item.chain.pieces[number].add_site(name=site, pos=pos, size=[width] * 3, group=4)
             tendon.wrap_site(site)
         crossings += _crossings(item, offsets)
-    actuator = spec.add_actuator(name=name)
-    actuator.trntype = mujoco.mjtTrn.mjTRN_TENDON
-    actuator.target = name
-    actuator.gaintype = mujoco.mjtGain.mjGAIN_FIXED
-    actuator.gainprm = np.zeros(10)
-    actuator.biastype = mujoco.mjtBias.mjBIAS_AFFINE
-    actuator.biasprm = np.zeros(10)
-    actuator.forcelimited = 1
-    actuator.forcerange = [-1e3, 0.0]  # slack at zero; no real TCA comes near the other bound
+    spec.add_actuator(
+        name=name, trntype=mujoco.mjtTrn.mjTRN_TENDON, target=name,
+        gaintype=mujoco.mjtGain.mjGAIN_FIXED, gainprm=np.zeros(10),
+        biastype=mujoco.mjtBias.mjBIAS_AFFINE, biasprm=np.zeros(10),
+        # Slack at zero; no real TCA comes near the other bound.
+        forcelimited=1, forcerange=[-1e3, 0.0],
+    )  # fmt: skip
     return RoutedTca(name, tca, length, stretch, tuple(crossings))
 
 

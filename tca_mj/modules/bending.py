@@ -4,14 +4,14 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
-from tca_mj.checks import require_count, require_positive
+from tca_mj.checks import Checked, Count, Positive
+from tca_mj.model.build import add_tca
 from tca_mj.model.chain import add_chain
 from tca_mj.model.part import Part, new_spec
-from tca_mj.model.tendon import lay_tca, route_passes
 from tca_mj.rod.beam import BeamSpec
 from tca_mj.routes import Route, parallel
 from tca_mj.tca import CATALOGUE, TcaSpec
-from tca_mj.tca.embedding import SILICONE_DENSITY, silicone_body
+from tca_mj.tca.embedding import SILICONE_DENSITY, in_silicone
 
 SILICONE_YOUNG = 0.125e6  # Ecoflex 00-30, Sun, Section 5.3 [Pa]
 SILICONE_SHEAR = SILICONE_YOUNG / 3.0  # incompressible, Sun, Section 5.3 [Pa]
@@ -43,17 +43,16 @@ def straight_module(
     Raises:
         ValueError: If the geometry cannot be built.
     """
-    mjspec = new_spec(name)
-    chain = add_chain(mjspec.worldbody, body, nodes=nodes, name="body")
+    part = Part(new_spec(name), sites={"tip": "tip"})
+    chain = add_chain(part.spec.worldbody, body, nodes=nodes, name="body")
     chain.mark_tip("tip")
-    tcas = tuple(
-        lay_tca(mjspec, tca, route_passes(chain, route), name=key) for key, route in routes.items()
-    )
-    return Part(mjspec, tcas, {"tip": "tip"})
+    for key, route in routes.items():
+        add_tca(part, chain, route, tca, name=key)
+    return part
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
-class BendingSpec:
+class BendingSpec(Checked):
     """A cylinder with parallel TCAs.
 
     The published figures contradict each other: TCAs 4 mm from the centre do not fit a body of
@@ -77,18 +76,13 @@ class BendingSpec:
         ValueError: If a dimension is not finite and positive, or a number of pieces not whole.
     """
 
-    length: float = 45e-3
-    diameter: float = 4.5e-3
-    outer_diameter: float = 9e-3
-    offset: float = 4e-3
-    count: int = 3
-    nodes: int = 8
+    length: Positive = 45e-3
+    diameter: Positive = 4.5e-3
+    outer_diameter: Positive = 9e-3
+    offset: Positive = 4e-3
+    count: Count = 3
+    nodes: Count = 8
     tca: TcaSpec = field(default_factory=lambda: CATALOGUE["free-stroke"])
-
-    def __post_init__(self) -> None:
-        require_positive(length=self.length, diameter=self.diameter,
-                         outer_diameter=self.outer_diameter, offset=self.offset)  # fmt: skip
-        require_count(count=self.count, nodes=self.nodes)
 
     @property
     def body(self) -> BeamSpec:
@@ -99,10 +93,9 @@ class BendingSpec:
     @property
     def embedded(self) -> TcaSpec:
         """The TCA in its channel, loosely, with its share of the silicone."""
-        return replace(self.tca, body=silicone_body(
-            self.tca, section=math.pi * self.diameter**2 / 4.0 / self.count,
-            perimeter=math.pi * self.outer_diameter / self.count,
-        ))  # fmt: skip
+        section = math.pi * self.diameter**2 / 4.0 / self.count
+        perimeter = math.pi * self.outer_diameter / self.count
+        return in_silicone(self.tca, section=section, perimeter=perimeter)
 
 
 def bending_module(spec: BendingSpec | None = None) -> Part:

@@ -2,14 +2,16 @@
 
 import math
 from dataclasses import dataclass, field, replace
+from functools import partial
+from typing import Annotated
 
 import mujoco
 
-from tca_mj.checks import number, require_count, require_positive
+from tca_mj.checks import Checked, Count, Finite, Positive, number
+from tca_mj.model.build import add_tca
 from tca_mj.model.chain import Chain, Motion, add_chain
 from tca_mj.model.part import Part, new_spec
 from tca_mj.model.surface import TOUCHES_NOTHING, surface
-from tca_mj.model.tendon import lay_tca, route_passes
 from tca_mj.rod.beam import BeamSpec, Outline
 from tca_mj.routes import Helix
 from tca_mj.tca import CATALOGUE, TcaSpec
@@ -22,7 +24,7 @@ PRINTED_DENSITY = 1200.0  # printed resin and PLA, solid; estimate [kg/m³]
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
-class LegSpec:
+class LegSpec(Checked):
     """A leg. Sun names its parts but prints no dimension, so all of them are estimates.
 
     Attributes:
@@ -56,34 +58,26 @@ class LegSpec:
             outside the plates, or one of the two bends is missing.
     """
 
-    length: float = 55e-3
-    rod_diameter: float = 0.5e-3
-    offset: float = 8e-3
-    phase: float = 0.0
-    count: int = 3
-    plate_radius: float = 9e-3
-    plate_thickness: float = 1e-3
-    plate_fill: float = 0.5
-    foot_radius: float = 5e-3
-    foot_mass: float = 0.56e-3
-    friction: float = 0.8
-    plate_friction: float = 0.3
-    damping_time: float = 20e-3
+    length: Positive = 55e-3
+    rod_diameter: Positive = 0.5e-3
+    offset: Positive = 8e-3
+    phase: Finite = 0.0
+    count: Count = 3
+    plate_radius: Positive = 9e-3
+    plate_thickness: Positive = 1e-3
+    plate_fill: Annotated[float, partial(number, above=0.0, at_most=1.0)] = 0.5
+    foot_radius: Positive = 5e-3
+    foot_mass: Positive = 0.56e-3
+    friction: Positive = 0.8
+    plate_friction: Positive = 0.3
+    damping_time: Positive = 20e-3
     motions: tuple[Motion, ...] = ("bend_x", "bend_y", "twist")
-    nodes: int = 3
+    nodes: Count = 3
     tca: TcaSpec = field(default_factory=lambda: CATALOGUE["free-stroke"])
 
     def __post_init__(self) -> None:
-        require_positive(
-            **{name: getattr(self, name) for name in (
-                "length", "rod_diameter", "plate_radius", "plate_thickness", "plate_friction",
-                "foot_radius", "foot_mass", "friction", "damping_time",
-            )}
-        )  # fmt: skip
-        require_count(count=self.count, nodes=self.nodes)
-        number("phase", self.phase)
-        number("offset", self.offset, above=0.0, below=self.plate_radius, unit="m, plate_radius")
-        number("plate_fill", self.plate_fill, above=0.0, at_most=1.0)
+        Checked.__post_init__(self)
+        number("offset", self.offset, below=self.plate_radius, unit="m, plate_radius")
         if not {"bend_x", "bend_y"} <= set(self.motions):
             raise ValueError(f"motions must contain 'bend_x' and 'bend_y', got {self.motions}")
 
@@ -118,20 +112,17 @@ def continuum_leg(spec: LegSpec | None = None, *, mirrored: bool = False) -> Par
         ValueError: If the geometry cannot be built.
     """
     spec = spec or LegSpec()
-    mjspec = new_spec("leg")
+    part = Part(new_spec("leg"), sites={"tip": "tip", "foot": "foot"})
     chain = add_chain(
-        mjspec.worldbody, spec.body, nodes=spec.nodes, name="rod", motions=spec.motions,
+        part.spec.worldbody, spec.body, nodes=spec.nodes, name="rod", motions=spec.motions,
         rgba=(0.1, 0.1, 0.1, 0.0), collide=False,
     )  # fmt: skip
     turn = (-2.0 if mirrored else 2.0) * math.pi / spec.count
     _dress(chain, spec, turn)
     _foot(chain, spec)
-    routes = [Helix(spec.offset, phase=spec.phase + turn * i) for i in range(spec.count)]
-    tcas = tuple(
-        lay_tca(mjspec, spec.tca, route_passes(chain, route), name=f"tca{i}")
-        for i, route in enumerate(routes)
-    )
-    return Part(mjspec, tcas, {"tip": "tip", "foot": "foot"})
+    for i in range(spec.count):
+        add_tca(part, chain, Helix(spec.offset, phase=spec.phase + turn * i), spec.tca)
+    return part
 
 
 def _dress(chain: Chain, spec: LegSpec, turn: float) -> None:

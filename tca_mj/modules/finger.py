@@ -8,7 +8,7 @@ and the fingers open. Cold, they close and hold an object without power.
 import math
 from dataclasses import dataclass, field, replace
 
-from tca_mj.checks import number, require_count, require_positive
+from tca_mj.checks import Checked, Count, NotNegative, Positive
 from tca_mj.model.chain import add_chain
 from tca_mj.model.part import Part, new_spec
 from tca_mj.model.tendon import Pass, lay_tca
@@ -16,7 +16,7 @@ from tca_mj.modules.bending import SILICONE_YOUNG
 from tca_mj.rod.beam import BeamSpec
 from tca_mj.routes import UTurn
 from tca_mj.tca import CATALOGUE, TcaSpec
-from tca_mj.tca.embedding import SILICONE_DENSITY, silicone_body
+from tca_mj.tca.embedding import SILICONE_DENSITY, in_silicone
 
 _HALF = math.sqrt(0.5)
 # Rotations of the fingers' bases, wxyz: z to +x or -x of the mount, x (the outside) to its -z.
@@ -24,7 +24,7 @@ _FRAMES = ((_HALF, 0.0, _HALF, 0.0), (0.0, -_HALF, 0.0, _HALF))
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
-class FingerPairSpec:
+class FingerPairSpec(Checked):
     """A soft body bent to a ring, and the TCA that opens it.
 
     The body is a laminate: a soft core between two layers of a stiffer elastomer. The published
@@ -54,25 +54,17 @@ class FingerPairSpec:
             friction negative.
     """
 
-    length: float = 35e-3
-    width: float = 6e-3
-    core: float = 3e-3
-    layer: float = 1e-3
-    layer_young: float = 0.25e6
+    length: Positive = 35e-3
+    width: Positive = 6e-3
+    core: Positive = 3e-3
+    layer: Positive = 1e-3
+    layer_young: Positive = 0.25e6
     offset: float = 2.5e-3
     half_width: float = 1.5e-3
-    closure: float = math.pi
-    nodes: int = 8
-    friction: float = 1.0
+    closure: Positive = math.pi
+    nodes: Count = 8
+    friction: NotNegative = 1.0
     tca: TcaSpec = field(default_factory=lambda: CATALOGUE["free-stroke"])
-
-    def __post_init__(self) -> None:
-        require_positive(
-            length=self.length, width=self.width, core=self.core, layer=self.layer,
-            layer_young=self.layer_young, closure=self.closure,
-        )  # fmt: skip
-        require_count(nodes=self.nodes)
-        number("friction", self.friction, at_least=0.0)
 
     @property
     def thickness(self) -> float:
@@ -91,13 +83,11 @@ class FingerPairSpec:
         plates = (core, whole, gap)
         bend_x, bend_y = ((a + b - c) for a, b, c in zip(*(p.bending for p in plates), strict=True))
         return replace(
-            whole,
-            bending=(bend_x, bend_y),
-            torsion=core.torsion + whole.torsion - gap.torsion,
+            whole, bending=(bend_x, bend_y), torsion=core.torsion + whole.torsion - gap.torsion,
             stretching=core.stretching + whole.stretching - gap.stretching,
             shearing=core.shearing + whole.shearing - gap.shearing,
             curvature=(0.0, -self.closure / whole.length, 0.0),
-        )
+        )  # fmt: skip
 
     def _plate(self, thickness: float, young: float) -> BeamSpec:
         return BeamSpec.box(
@@ -108,10 +98,8 @@ class FingerPairSpec:
     @property
     def embedded(self) -> TcaSpec:
         """The TCA in its bent channel, pressed to its wall; each leg has half of the body."""
-        return replace(self.tca, body=silicone_body(
-            self.tca, section=self.thickness * self.width / 2.0,
-            perimeter=self.thickness + self.width, touching=0.5,
-        ))  # fmt: skip
+        section, perimeter = self.thickness * self.width / 2.0, self.thickness + self.width
+        return in_silicone(self.tca, section=section, perimeter=perimeter, touching=0.5)
 
     @property
     def route(self) -> UTurn:

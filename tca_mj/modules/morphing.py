@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 
 import mujoco
 
-from tca_mj.checks import number, require_count, require_positive
+from tca_mj.checks import Checked, Count, NotNegative, Positive
 from tca_mj.model.chain import Chain, Motion, add_chain
 from tca_mj.model.part import Part, new_spec
 from tca_mj.model.spine import route_spine, sheath
@@ -29,7 +29,7 @@ _PROTRUSIONS = 6  # pairs that hold the tube; Sun, Fig. 6.1, shows them, the num
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
-class MorphingSpec:
+class MorphingSpec(Checked):
     """A bending morphing module.
 
     Attributes:
@@ -53,17 +53,15 @@ class MorphingSpec:
     spine: SpineSpec = field(default_factory=SpineSpec)
     heater: HeaterSpec = field(default_factory=lambda: HeaterSpec.fitted(SpineSpec()))
     tca: TcaSpec = field(default_factory=lambda: CATALOGUE["free-stroke"])
-    mass: float = 3.5e-3
-    half_width: float = 1.6e-3
-    tip_mass: float = 0.0
-    damping_time: float = 20e-3
+    mass: Positive = 3.5e-3
+    half_width: Positive = 1.6e-3
+    tip_mass: NotNegative = 0.0
+    damping_time: Positive = 20e-3
     motions: tuple[Motion, ...] = ("bend_x", "bend_y", "twist")
-    nodes: int = 10
+    nodes: Count = 10
 
     def __post_init__(self) -> None:
-        require_positive(mass=self.mass, half_width=self.half_width, damping_time=self.damping_time)
-        require_count(nodes=self.nodes)
-        number("tip_mass", self.tip_mass, at_least=0.0, unit="kg")
+        Checked.__post_init__(self)
         if "bend_x" not in self.motions:
             raise ValueError(f"motions must contain 'bend_x', got {self.motions}")
 

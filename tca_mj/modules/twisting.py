@@ -1,19 +1,19 @@
 """The twisting module: a silicone cylinder wrapped by one TCA (Sun, Section 4.1.2)."""
 
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
-from tca_mj.checks import number, require_count, require_positive
+from tca_mj.checks import Checked, Count, Positive, number
 from tca_mj.model.part import Part
 from tca_mj.modules.bending import silicone_cylinder, straight_module
 from tca_mj.rod.beam import BeamSpec
 from tca_mj.routes import Helix, Route, UTurn
 from tca_mj.tca import CATALOGUE, TcaSpec
-from tca_mj.tca.embedding import silicone_body
+from tca_mj.tca.embedding import in_silicone
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
-class TwistingSpec:
+class TwistingSpec(Checked):
     """A cylinder with a TCA wound round it as a single or a double helix.
 
     Attributes:
@@ -40,31 +40,26 @@ class TwistingSpec:
         ValueError: If a dimension is not finite and positive, or a number of nodes not whole.
     """
 
-    length: float = 16e-3
-    diameter: float = 7e-3
-    outer_diameter: float = 10e-3
-    radius: float = 3.5e-3
+    length: Positive = 16e-3
+    diameter: Positive = 7e-3
+    outer_diameter: Positive = 10e-3
+    radius: Positive = 3.5e-3
     turns: float = 5.0
     double: bool = True
-    nodes: int = 8
+    nodes: Count = 8
     tca: TcaSpec = field(default_factory=lambda: CATALOGUE["free-stroke"])
     tube: float = 3.2e-3
 
     def __post_init__(self) -> None:
-        require_positive(
-            length=self.length, diameter=self.diameter, outer_diameter=self.outer_diameter,
-            radius=self.radius,
-        )  # fmt: skip
-        require_count(nodes=self.nodes)
+        Checked.__post_init__(self)
         number("tube", self.tube, above=2.0 * self.tca.outer_radius, unit="m, the TCA's width")
 
     @property
     def embedded(self) -> TcaSpec:
         """The TCA in its wound tube, tightly; half of the tube's outside meets air."""
-        return replace(self.tca, body=silicone_body(
-            self.tca, section=math.pi * (self.tube**2 / 4.0 - self.tca.outer_radius**2),
-            perimeter=math.pi * self.tube / 2.0, touching=1.0,
-        ))  # fmt: skip
+        section = math.pi * (self.tube**2 / 4.0 - self.tca.outer_radius**2)
+        perimeter = math.pi * self.tube / 2.0
+        return in_silicone(self.tca, section=section, perimeter=perimeter, touching=1.0)
 
     @property
     def body(self) -> BeamSpec:

@@ -5,31 +5,24 @@ They need imageio and imageio-ffmpeg, which are loaded when the first one is beg
 
 import importlib
 from pathlib import Path
-from typing import Any, Self
+from typing import Any
 
 import mujoco
 
 from tca_mj.checks import require_count, require_positive
-from tca_mj.record.render import Offscreen, Watched, colour_tendons
+from tca_mj.record.render import Closing, Offscreen, Watched, colour_tendons
 
 
-class Film:
+class Film(Closing):
     """A simulation filmed at a steady rate, whatever its control period; a context manager.
 
     The file is an mp4 (H.264, yuv420p). Frames go to the encoder one by one and are not kept.
     """
 
     def __init__(
-        self,
-        simulation: Watched,
-        path: str | Path,
-        *,
-        fps: float = 30.0,
-        speed: float = 1.0,
-        width: int = 960,
-        height: int = 720,
-        camera: int | str | mujoco.MjvCamera = -1,
-    ) -> None:
+        self, simulation: Watched, path: str | Path, *, fps: float = 30.0, speed: float = 1.0,
+        width: int = 960, height: int = 720, camera: int | str | mujoco.MjvCamera = -1,
+    ) -> None:  # fmt: skip
         """Prepares the file; OpenGL is set up by the first frame.
 
         Args:
@@ -105,12 +98,6 @@ class Film:
         if self._view is not None:
             self._view.close()
             self._view = None
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
 
 
 def _imageio() -> Any:

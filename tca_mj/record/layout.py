@@ -70,23 +70,18 @@ def groups(simulation: Any) -> list[Group]:
             BODY_TITLE, paths("actuators", [names[j] for j in embedded], BODY_QUANTITY),
             [styles[j] for j in embedded], lambda: simulation.body_temperature[embedded], False,
         ))  # fmt: skip
-    spines = getattr(simulation, "spines", None)
-    if spines is not None and spines.n:
-        found += [
-            Group(title, paths("heaters", spines.names, quantity), line_styles(spines.names),
-                  partial(getattr, spines, quantity), True)
-            for quantity, title in HEATER_QUANTITIES.items()
-        ]  # fmt: skip
     # What other kinds of actuators show that the curves above do not.
     for group in getattr(simulation, "groups", ()):
-        if group.kind in ("TCA", "spine"):
-            continue
+        root, titles = group.kind.replace(" ", "_"), {
+            name: f"{group.kind}: {name} [{signal.unit}]" for name, signal in group.signals.items()
+            if group.kind != "TCA" and name not in (*QUANTITIES, "energy")
+        }  # fmt: skip
+        if group.kind == "spine":
+            root, titles = "heaters", HEATER_QUANTITIES
         found += [
-            Group(f"{group.kind}: {name} [{signal.unit}]",
-                  paths(group.kind.replace(" ", "_"), group.names, name),
-                  line_styles(group.names), partial(_shown, simulation, group.kind, name), True)
-            for name, signal in group.signals.items()
-            if name not in (*QUANTITIES, "energy")
+            Group(title, paths(root, group.names, name), line_styles(group.names),
+                  partial(_shown, simulation, group.kind, name), True)
+            for name, title in titles.items()
         ]  # fmt: skip
     return found
 

@@ -101,20 +101,11 @@ def event_rows(widths: Sequence[float], positions: Sequence[float]) -> list[int]
 
 
 def rollout_plot(
-    path: str | Path,
-    time: ArrayLike,
-    power: ArrayLike,
-    temperature: ArrayLike,
-    tension: ArrayLike,
-    bend: ArrayLike,
-    names: Sequence[str],
-    events: Sequence[tuple[float, str]] = (),
-    *,
-    body: ArrayLike | None = None,
-    title: str = "",
-    temperature_limit: float | None = HOTTEST,
+    path: str | Path, time: ArrayLike, power: ArrayLike, temperature: ArrayLike, tension: ArrayLike,
+    bend: ArrayLike, names: Sequence[str], events: Sequence[tuple[float, str]] = (), *,
+    body: ArrayLike | None = None, title: str = "", temperature_limit: float | None = HOTTEST,
     tension_limit: float | None = BREAKING_FORCE,
-) -> None:
+) -> None:  # fmt: skip
     """Draws power, temperature, tension and bend angle of a rollout, one above the other.
 
     Args:
@@ -164,11 +155,10 @@ def rollout_plot(
 
     # Rows of labels: measured as drawn, then the panels take what is left.
     renderer: Any = canvas.get_renderer()
-    inches, widths = 11.0 * (right - left), []
-    for _, text in ordered:
-        probe = figure.text(0.0, 0.0, text, fontsize=8.5)
-        widths.append(probe.get_window_extent(renderer).width / figure.dpi + 0.12)
-        probe.remove()
+    labels = [figure.text(0.0, 0.0, word, fontsize=8.5, color="#3c4043", va="bottom")
+              for _, word in ordered]  # fmt: skip
+    inches = 11.0 * (right - left)
+    widths = [each.get_window_extent(renderer).width / figure.dpi + 0.12 for each in labels]
     anchors = [
         min((at - start) / span * inches, max(0.0, inches + 1.7 - width))
         for (at, _), width in zip(ordered, widths, strict=True)
@@ -176,10 +166,8 @@ def rollout_plot(
     rows = event_rows(widths, anchors)
     header = 0.024 * (max(rows, default=-1) + 1) + (0.008 if rows else 0.0)
 
-    grid = figure.add_gridspec(
-        4, 1, left=left, right=right, bottom=bottom, top=top - header, hspace=0.12
-    )
-    axes: Any = grid.subplots(sharex=True)
+    grid = {"left": left, "right": right, "bottom": bottom, "top": top - header, "hspace": 0.12}
+    axes: Any = figure.subplots(4, 1, sharex=True, gridspec_kw=grid)
     colours = series_colours(len(names), lightness=0.57)
     lines: list[Any] = []
     for axis, (label, values, limit, unit) in zip(axes, panels, strict=True):
@@ -201,45 +189,37 @@ def rollout_plot(
             if body is not None and label == "temperature":
                 warm = np.broadcast_to(floats("body", body), values.shape)
                 axis.plot(clock, warm, linewidth=1.3, linestyle=":")
-                axis.annotate(
-                    "dotted: the body that a TCA lies in", (0.0, 0.0), xycoords="axes fraction",
-                    xytext=(6, 3), textcoords="offset points", color="#5f6368", fontsize=8,
-                )
+                axis.annotate("dotted: the body that a TCA lies in", (0.0, 0.0), (6, 3),
+                              "axes fraction", "offset points", color="#5f6368",
+                              fontsize=8)  # fmt: skip
             axis.set_ylim(bottom=min(0.0, float(np.nanmin(values, initial=0.0))))
         if limit is not None:
             axis.axhline(limit, color="#c5221f", linewidth=1.1, linestyle=(0, (5, 3)))
             low, high = axis.get_ylim()
             axis.set_ylim(low, max(high, limit + 0.12 * (limit - low)))
-            axis.annotate(
-                f"limit {limit:g} {unit}", (1.0, limit), xycoords=("axes fraction", "data"),
-                xytext=(-6, 2), textcoords="offset points", color="#c5221f", fontsize=9,
-                ha="right", va="bottom",
-            )
+            axis.annotate(f"limit {limit:g} {unit}", (1.0, limit), (-6, 2),
+                          ("axes fraction", "data"), "offset points", color="#c5221f", fontsize=9,
+                          ha="right", va="bottom")  # fmt: skip
     axes[-1].set_xlabel("time [s]", fontsize=10)
     axes[0].set_xlim(start, start + span)
 
     # Phases between two events are shaded in turn; a thin line leads from each event to its label.
     marks = [at for at, _ in ordered]
-    for i, (at, until) in enumerate(zip(marks, [*marks[1:], end], strict=True)):
+    for i, (at, until) in enumerate(zip(marks, [*marks[1:], end], strict=False)):
         for axis in axes:
             axis.axvline(at, color="#9aa0a6", linewidth=0.7, zorder=1)
             if i % 2 == 0 and until > at:
                 axis.axvspan(at, until, color="#eceff4", linewidth=0.0, zorder=0)
-    for (at, text), anchor, row in zip(ordered, anchors, rows, strict=True):
-        x = left + (at - start) / span * (right - left)
-        y = top - header + 0.008 + 0.024 * row
-        leader = Line2D([x, x], [top - header, y + 0.016], color="#9aa0a6", linewidth=0.7)
-        figure.add_artist(leader)
-        figure.text(
-            left + anchor / 11.0 + 0.004, y, text, fontsize=8.5, color="#3c4043", va="bottom"
-        )
+    for at, text, anchor, row in zip(marks, labels, anchors, rows, strict=True):
+        x, y = left + (at - start) / span * (right - left), top - header + 0.008 + 0.024 * row
+        figure.add_artist(
+            Line2D([x, x], [top - header, y + 0.016], color="#9aa0a6", linewidth=0.7))
+        text.set_position((left + anchor / 11.0 + 0.004, y))
 
     if lines:
-        figure.legend(
-            lines, list(names), loc="upper left", bbox_to_anchor=(right + 0.012, top - header),
-            fontsize=9, frameon=False, handlelength=1.6, borderaxespad=0.0, title="TCA",
-            title_fontsize=9, alignment="left",
-        )
+        figure.legend(lines, list(names), loc="upper left", title="TCA", alignment="left",
+                      bbox_to_anchor=(right + 0.012, top - header), fontsize=9, title_fontsize=9,
+                      frameon=False, handlelength=1.6, borderaxespad=0.0)  # fmt: skip
     if title:
         figure.text(left, 0.967, title, fontsize=13, color="#202124", va="center")
     target = Path(path)

@@ -23,7 +23,7 @@ Entities:
 
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any, Protocol, Self
+from typing import Any, Protocol
 
 import numpy as np
 import rerun
@@ -33,23 +33,24 @@ from tca_mj.checks import Array, require_count, require_positive
 from tca_mj.record import shapes
 from tca_mj.record.layout import QUANTITIES, blueprint, groups, line_styles
 from tca_mj.record.plots import temperature_colour
-from tca_mj.record.render import Watched
+from tca_mj.record.render import Closing, Watched
 
 __all__ = ["QUANTITIES", "Recorded", "Recorder"]
 
-_POSITION = rerun.Transform3D.descriptor_translation()
-_QUATERNION = rerun.Transform3D.descriptor_quaternion()
-_SCALAR = rerun.Scalars.descriptor_scalars()
-_STRIP = rerun.LineStrips3D.descriptor_strips()
-_COLOUR = rerun.LineStrips3D.descriptor_colors()
-_TEXT = rerun.TextLog.descriptor_text()
+# What is sent, and as what.
+_POSITION = rerun.Transform3D.descriptor_translation(), rerun.components.Translation3DBatch
+_QUATERNION = rerun.Transform3D.descriptor_quaternion(), rerun.components.RotationQuatBatch
+_SCALAR = rerun.Scalars.descriptor_scalars(), rerun.components.ScalarBatch
+_STRIP = rerun.LineStrips3D.descriptor_strips(), rerun.components.LineStrip3DBatch
+_COLOUR = rerun.LineStrips3D.descriptor_colors(), rerun.components.ColorBatch
+_TEXT = rerun.TextLog.descriptor_text(), rerun.components.TextBatch
 
 
 class Recorded(Watched, Protocol):
     """What is recorded of a simulation; ``tca_mj.sim.Simulation`` has it.
 
     The properties are float64 of shape (n,), one entry per TCA. Shape-memory spines are recorded
-    too where there are some, and soft bodies: attributes ``spines``, ``embedded``,
+    too where there are some, and soft bodies: attributes ``groups``, ``embedded``,
     ``body_temperature`` and ``extrapolated`` as ``Simulation`` has them.
     """
 
@@ -65,7 +66,7 @@ class Recorded(Watched, Protocol):
     def resistance(self) -> Array: ...
 
 
-class Recorder:
+class Recorder(Closing):
     """Writes a simulation to a ``.rrd`` file; a context manager.
 
     Leaving the context by an exception or Ctrl-C writes what was collected. A process that is
@@ -206,12 +207,6 @@ class Recorder:
         finally:
             self._stream.disconnect()
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
-
     def _now(self) -> float:
         """Recorded time [s]: the simulation's, but never running back."""
         if self._closed:
@@ -235,12 +230,10 @@ class Recorder:
         if k:
             poses = zip(self._body_paths, self._position, self._quaternion, strict=True)
             for path, position, quaternion in poses:
-                moved = rerun.components.Translation3DBatch(position[:k])
                 xyzw = quaternion[:k, [1, 2, 3, 0]]  # MuJoCo has wxyz
-                turned = rerun.components.RotationQuatBatch(xyzw)
-                self._send(path, times, (_POSITION, moved), (_QUATERNION, turned))
+                self._send(path, times, (_POSITION, position[:k]), (_QUATERNION, xyzw))
             for path, curve in zip(self._paths, self._curves, strict=True):
-                self._send(path, times, (_SCALAR, rerun.components.ScalarBatch(curve[:k])))
+                self._send(path, times, (_SCALAR, curve[:k]))
             n = len(self._strips)
             hot = list(QUANTITIES).index("temperature") * n
             colours = _packed(temperature_colour(self._curves[hot : hot + n, :k]))
@@ -248,30 +241,26 @@ class Recorder:
                 strips = every[:k]
                 # Only a path round an obstacle has now more points, now fewer: Rerun's slow way.
                 even = len({len(strip) for strip in strips}) == 1
-                lines = rerun.components.LineStrip3DBatch(np.array(strips) if even else strips)
-                shades = rerun.components.ColorBatch(colour)
-                self._send(name, times, (_STRIP, lines), (_COLOUR, shades))
+                lines = np.array(strips) if even else strips
+                self._send(name, times, (_STRIP, lines), (_COLOUR, colour))
         for term, (frames, amounts) in self._rewards.items():
             path = f"/reward/{rerun.escape_entity_path_part(term)}"
             if term not in self._reward_names:
                 self._reward_names.append(term)
                 style = line_styles(self._reward_names)[-1]
                 self._stream.log(path, style, static=True, strict=True)
-            values = rerun.components.ScalarBatch(np.array(amounts))
             when = _times(self._clock[frames], self._steps[frames])
-            self._send(path, when, (_SCALAR, values))
+            self._send(path, when, (_SCALAR, np.array(amounts)))
         if self._events:
             at, steps, texts = zip(*self._events, strict=True)
-            when = _times(np.array(at), np.array(steps))
-            said = rerun.components.TextBatch(texts)
-            self._send("/events", when, (_TEXT, said))
+            self._send("/events", _times(np.array(at), np.array(steps)), (_TEXT, texts))
         self._stream.flush()
         self._filled = 0
         self._rewards.clear()
         self._events.clear()
 
     def _send(self, path: str, times: list[rerun.TimeColumn], *columns: Any) -> None:
-        made = [rerun.ComponentColumn(descriptor, batch) for descriptor, batch in columns]
+        made = [rerun.ComponentColumn(what, batch(values)) for (what, batch), values in columns]
         self._stream.send_columns(path, times, made, strict=True)
 
     def _static(

@@ -43,6 +43,19 @@ class RenderingUnavailable(RuntimeError):
     """Pictures cannot be drawn here; the message says what to install."""
 
 
+class Closing:
+    """A context manager that is closed at its end."""
+
+    def close(self) -> None:
+        """Gives back what it holds; it may be called again."""
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+
 class Watched(Protocol):
     """What a camera needs of a simulation; ``tca_mj.sim.Simulation`` has it."""
 
@@ -130,17 +143,13 @@ def colour_tendons(model: mujoco.MjModel, tendon: ArrayLike, temperature: ArrayL
     model.tendon_rgba[np.asarray(tendon, dtype=np.int64), :3] = temperature_colour(temperature)
 
 
-class Offscreen:
+class Offscreen(Closing):
     """A camera and the memory it draws into; a context manager."""
 
     def __init__(
-        self,
-        model: mujoco.MjModel,
-        *,
-        width: int = 960,
-        height: int = 720,
+        self, model: mujoco.MjModel, *, width: int = 960, height: int = 720,
         camera: int | str | mujoco.MjvCamera = -1,
-    ) -> None:
+    ) -> None:  # fmt: skip
         """Sets up OpenGL.
 
         Args:
@@ -211,12 +220,6 @@ class Offscreen:
             self._gl.free()
             self._gl = None
             atexit.unregister(getattr(self, "_at_exit", _close))
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
 
 
 def _close(reference: weakref.ref[Offscreen]) -> None:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import mujoco
 
-from tca_mj.checks import number, require_positive, within
+from tca_mj.checks import Checked, Positive, number, within
 from tca_mj.model.part import Part, new_spec
 from tca_mj.model.surface import TOUCHES_NOTHING
 from tca_mj.modules.bending import BendingSpec, bending_module
@@ -16,7 +16,7 @@ from tca_mj.modules.twisting import TwistingSpec, twisting_module
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
-class ArmSpec:
+class ArmSpec(Checked):
     """The arm and its base.
 
     Attributes:
@@ -37,16 +37,14 @@ class ArmSpec:
     bending: BendingSpec = field(default_factory=BendingSpec)
     twisting: TwistingSpec = field(default_factory=TwistingSpec)
     gripper: FingerPairSpec = field(default_factory=FingerPairSpec)
-    connector: float = 1.5e-3
-    connector_mass: float = 0.1e-3
+    connector: Positive = 1.5e-3
+    connector_mass: Positive = 0.1e-3
     height: float = 0.14
     travel: tuple[float, float] = (0.07, 0.18)
-    speed: float = 0.04
+    speed: Positive = 0.04
 
     def __post_init__(self) -> None:
-        require_positive(
-            connector=self.connector, connector_mass=self.connector_mass, speed=self.speed
-        )
+        Checked.__post_init__(self)
         low, high = within("travel", self.travel, shape=(2,), above=0.0, unit="m")
         if not low < high:
             raise ValueError(f"travel must be a low and a higher height, got {self.travel}")

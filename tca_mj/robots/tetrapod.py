@@ -11,11 +11,13 @@ joints all three of them stiffen, each at its own temperature.
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from functools import partial
+from itertools import product
+from typing import Annotated, Any
 
 import mujoco
 
-from tca_mj.checks import number, require_count, require_positive
+from tca_mj.checks import Checked, Count, Positive, number
 from tca_mj.model.chain import Chain, Motion, add_chain
 from tca_mj.model.part import Part, new_spec
 from tca_mj.model.spine import lumped_torsion, route_spine, sheath
@@ -32,12 +34,13 @@ LEGS = ("front_left", "front_right", "rear_left", "rear_right")
 SIDES = {"left": 1.0, "right": -1.0}  # the sign of y
 SPINES = 3
 
+_Bend = Annotated[float, partial(number, above=-math.pi, below=math.pi, unit="rad")]
 # Stiffness of what is round a spine (tube, wires) over that of the soft spine. Estimate.
 _SHEATH = 0.01
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
-class TetrapodSpec:
+class TetrapodSpec(Checked):
     """The robot. Sun prints its length, its height when flat and its speeds; the rest is estimated.
 
     Attributes:
@@ -68,26 +71,16 @@ class TetrapodSpec:
     spine: SpineSpec = field(default_factory=SpineSpec)
     heater: HeaterSpec = field(default_factory=lambda: HeaterSpec.fitted(SpineSpec()))
     tca: TcaSpec = field(default_factory=lambda: CATALOGUE["free-stroke"])
-    module_mass: float = 3.5e-3
-    spacing: float = 40e-3
-    memory_angle: float = math.radians(20.0)
-    rail_length: float = 150e-3
-    rail_width: float = 6e-3
-    rail_mass: float = 3e-3
-    leg_station: float = 62e-3
-    leg_height: float = 6e-3
-    belly_friction: float = 0.3
-    nodes: int = 4
-
-    def __post_init__(self) -> None:
-        require_positive(
-            **{name: getattr(self, name) for name in (
-                "module_mass", "spacing", "rail_length", "rail_width",
-                "rail_mass", "leg_station", "leg_height", "belly_friction",
-            )}
-        )  # fmt: skip
-        require_count(nodes=self.nodes)
-        number("memory_angle", self.memory_angle, above=-math.pi, below=math.pi, unit="rad")
+    module_mass: Positive = 3.5e-3
+    spacing: Positive = 40e-3
+    memory_angle: _Bend = math.radians(20.0)
+    rail_length: Positive = 150e-3
+    rail_width: Positive = 6e-3
+    rail_mass: Positive = 3e-3
+    leg_station: Positive = 62e-3
+    leg_height: Positive = 6e-3
+    belly_friction: Positive = 0.3
+    nodes: Count = 4
 
     @property
     def places(self) -> tuple[float, ...]:
@@ -130,11 +123,10 @@ def tetrapod(spec: TetrapodSpec | None = None) -> Part:
     for i, x in enumerate(spec.places):
         name = f"spine{i}"
         part.tcas += (route_spine_tca(mjspec, halves, spec, x, name),)
-        part.spines += (
-            route_spine(
-                spec.spine, spec.heater, list(halves.values()), name=name, tca=name, torsion=torsion
-            ),
+        spine = route_spine(
+            spec.spine, spec.heater, list(halves.values()), name=name, tca=name, torsion=torsion
         )
+        part.spines += (spine,)
     return part
 
 
@@ -254,13 +246,9 @@ def attach_legs(part: Part, leg: LegSpec) -> None:
 
 
 def dress(
-    chain: Chain,
-    spec: TetrapodSpec,
-    *,
-    down: float,
-    places: Mapping[int, float],
+    chain: Chain, spec: TetrapodSpec, *, down: float, places: Mapping[int, float],
     behind: float = 0.0,
-) -> None:
+) -> None:  # fmt: skip
     """What of spines is seen and touched, tube below and polymer above.
 
     Args:
@@ -271,24 +259,22 @@ def dress(
         behind: How far the first piece reaches behind the chain's root; minus its length leaves
             it out [m].
     """
-    size, tube = spec.spine, spec.spine.module_height - spec.spine.thickness
+    size, below = spec.spine, down * spec.spine.module_height / 2.0
+    layers = (
+        ("spine", 0.0, size.thickness, [0.86, 0.78, 0.52, 1.0]),
+        ("tube", below, size.module_height - size.thickness, [0.9, 0.9, 0.88, 0.6]),
+    )
     for index, piece in enumerate(chain.pieces):
         end = chain.extent(index)
         begin = 0.0 if index else -behind
         half, middle = (end - begin) / 2.0, (end + begin) / 2.0
         if half <= 0.0:
             continue
-        for i, x in places.items():
+        for (i, x), (part, y, height, rgba) in product(places.items(), layers):
             piece.add_geom(
-                name=f"{chain.name}.spine{i}.{index}", type=mujoco.mjtGeom.mjGEOM_BOX,
-                pos=[x, 0.0, middle], size=[size.width / 2.0, size.thickness / 2.0, half],
-                rgba=[0.86, 0.78, 0.52, 1.0], **_belly(spec),
-            )  # fmt: skip
-            piece.add_geom(
-                name=f"{chain.name}.tube{i}.{index}", type=mujoco.mjtGeom.mjGEOM_BOX,
-                pos=[x, down * size.module_height / 2.0, middle],
-                size=[size.width / 2.0, tube / 2.0, half],
-                rgba=[0.9, 0.9, 0.88, 0.6], **_belly(spec),
+                name=f"{chain.name}.{part}{i}.{index}", type=mujoco.mjtGeom.mjGEOM_BOX,
+                pos=[x, y, middle], size=[size.width / 2.0, height / 2.0, half],
+                rgba=rgba, **_belly(spec),
             )  # fmt: skip
 
 

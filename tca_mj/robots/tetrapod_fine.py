@@ -9,12 +9,11 @@ import math
 from dataclasses import replace
 
 import mujoco
-import numpy as np
 
+from tca_mj.model.build import add_tca
 from tca_mj.model.chain import MOTIONS, Chain, Motion, add_chain
 from tca_mj.model.part import Part
 from tca_mj.model.spine import route_spine
-from tca_mj.model.tendon import lay_tca, route_passes
 from tca_mj.robots.tetrapod import TetrapodSpec, attach_legs, dress, route_spine_tca, trunk
 from tca_mj.routes import UTurn
 from tca_mj.smp.lumped import in_tube
@@ -25,6 +24,8 @@ _LEG_MOTIONS: tuple[Motion, ...] = ("bend_x", "bend_y", "twist")
 # constant that is so short only with its flag ``refsafe`` disabled, else two time steps.
 _SOLREF = (2e-4, 1.0)
 _SOLIMP = (0.999, 0.9999, 1e-4, 0.5, 2.0)
+# Zeros: as they are when all joints are at 0, in line; 1 m/rad by which errors of rotation count.
+_WELD = [0.0] * 10 + [1.0, 0.0]
 
 
 def fine_tetrapod(spec: TetrapodSpec | None = None, *, nodes: int = 6, leg_nodes: int = 10) -> Part:
@@ -53,8 +54,7 @@ def fine_tetrapod(spec: TetrapodSpec | None = None, *, nodes: int = 6, leg_nodes
         if i in outer:
             chains = [outer[i]]
             route = UTurn.parallel(spec.spine.tca_offset, spec.spine.width / 4.0, math.pi / 2.0)
-            passes = route_passes(outer[i], route)
-            part.tcas += (lay_tca(mjspec, in_tube(spec.tca), passes, name=name),)
+            add_tca(part, outer[i], route, in_tube(spec.tca), name=name)
         else:
             chains = list(halves.values())
             part.tcas += (route_spine_tca(mjspec, halves, spec, 0.0, name),)
@@ -75,12 +75,8 @@ def _outer(
         rgba=(0.0, 0.0, 0.0, 0.0), collide=False,
     )  # fmt: skip
     dress(chain, spec, down=1.0, places={number: 0.0})
-    weld = mjspec.add_equality(name=name)
-    weld.type = mujoco.mjtEq.mjEQ_WELD
-    weld.objtype = mujoco.mjtObj.mjOBJ_BODY
-    weld.name1, weld.name2 = left.tip.name, chain.tip.name
-    data = np.zeros(len(weld.data))  # zeros: as they are when all joints are at 0, in line
-    data[10] = 1.0  # m/rad by which errors of the rotation count
-    weld.data = data
-    weld.solref, weld.solimp = _SOLREF, _SOLIMP
+    mjspec.add_equality(
+        name=name, type=mujoco.mjtEq.mjEQ_WELD, objtype=mujoco.mjtObj.mjOBJ_BODY,
+        name1=left.tip.name, name2=chain.tip.name, data=_WELD, solref=_SOLREF, solimp=_SOLIMP,
+    )  # fmt: skip
     return chain

@@ -7,12 +7,6 @@ from tca_mj.rod.shape import RodShape
 from tca_mj.rod.static import solve_series, solve_static
 
 __all__ = [
-    "BeamSpec",
-    "Outline",
-    "RodShape",
-    "RodSolveError",
-    "Segment",
-    "StrandLaw",
-    "solve_series",
+    "BeamSpec", "Outline", "RodShape", "RodSolveError", "Segment", "StrandLaw", "solve_series",
     "solve_static",
-]
+]  # fmt: skip

@@ -1,15 +1,16 @@
 """What a soft beam is made of: section, stiffness, mass and reference shape."""
 
 from dataclasses import dataclass
-from typing import Any
+from functools import partial
+from typing import Annotated, Any
 
 import numpy as np
 
-from tca_mj.checks import number, require_positive, within
+from tca_mj.checks import Checked, NotNegative, Positive, Triple, require_positive, within
 
 
 @dataclass(frozen=True, slots=True)
-class Outline:
+class Outline(Checked):
     """Outer contour of a section: what is seen and touched, and what holds the TCAs.
 
     Attributes:
@@ -21,12 +22,12 @@ class Outline:
         ValueError: If a half is not finite and positive, or those of a disc differ.
     """
 
-    half_width: float
-    half_height: float
+    half_width: Positive
+    half_height: Positive
     round: bool = True
 
     def __post_init__(self) -> None:
-        require_positive(half_width=self.half_width, half_height=self.half_height)
+        Checked.__post_init__(self)
         if self.round and self.half_width != self.half_height:
             raise ValueError(
                 f"half_height must be half_width {self.half_width} m in a round outline,"
@@ -49,7 +50,7 @@ class Outline:
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
-class BeamSpec:
+class BeamSpec(Checked):
     """A uniform soft beam with z along its centre line.
 
     The stiffness belongs to the *effective* section, mass and contact to the *outline*; the two
@@ -71,24 +72,15 @@ class BeamSpec:
         ValueError: If a number is not finite or not positive where it must be.
     """
 
-    length: float
-    bending: tuple[float, float]
-    torsion: float
-    stretching: float
-    shearing: float
-    line_density: float
+    length: Positive
+    bending: Annotated[tuple[float, float], partial(within, shape=(2,), above=0.0)]
+    torsion: Positive
+    stretching: Positive
+    shearing: Positive
+    line_density: Positive
     outline: Outline
-    curvature: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    damping_time: float = 1e-2
-
-    def __post_init__(self) -> None:
-        within("bending", self.bending, shape=(2,), above=0.0)
-        require_positive(
-            length=self.length, torsion=self.torsion, stretching=self.stretching,
-            shearing=self.shearing, line_density=self.line_density,
-        )  # fmt: skip
-        number("damping_time", self.damping_time, at_least=0.0, unit="s")
-        within("curvature", self.curvature, shape=(3,))
+    curvature: Triple = (0.0, 0.0, 0.0)
+    damping_time: NotNegative = 1e-2
 
     @property
     def mass(self) -> float:
@@ -128,15 +120,10 @@ class BeamSpec:
         inertia = np.pi * diameter**4 / 64.0
         outline = Outline(outer / 2.0, outer / 2.0)
         return cls(
-            length=length,
-            bending=(young * inertia, young * inertia),
-            torsion=2.0 * shear * inertia,
-            stretching=young * area,
-            shearing=shear * area,
-            line_density=density * outline.area,
-            outline=outline,
-            **more,
-        )
+            length=length, bending=(young * inertia, young * inertia),
+            torsion=2.0 * shear * inertia, stretching=young * area, shearing=shear * area,
+            line_density=density * outline.area, outline=outline, **more,
+        )  # fmt: skip
 
     @classmethod
     def box(
@@ -164,13 +151,10 @@ class BeamSpec:
         return cls(
             length=length,
             bending=(young * width * height**3 / 12.0, young * height * width**3 / 12.0),
-            torsion=shear * torsion_constant(width, height),
-            stretching=young * area,
-            shearing=shear * area,
-            line_density=density * area,
-            outline=Outline(width / 2.0, height / 2.0, round=False),
-            **more,
-        )
+            torsion=shear * torsion_constant(width, height), stretching=young * area,
+            shearing=shear * area, line_density=density * area,
+            outline=Outline(width / 2.0, height / 2.0, round=False), **more,
+        )  # fmt: skip
 
 
 def torsion_constant(width: float, height: float) -> float:

@@ -16,15 +16,13 @@ def quaternion_product(left: ArrayLike, right: ArrayLike) -> Array:
     a, b = np.asarray(left, dtype=np.float64), np.asarray(right, dtype=np.float64)
     a0, a1, a2, a3 = np.moveaxis(a, -1, 0)
     b0, b1, b2, b3 = np.moveaxis(b, -1, 0)
-    return np.stack(
-        [
-            a0 * b0 - a1 * b1 - a2 * b2 - a3 * b3,
-            a0 * b1 + a1 * b0 + a2 * b3 - a3 * b2,
-            a0 * b2 - a1 * b3 + a2 * b0 + a3 * b1,
-            a0 * b3 + a1 * b2 - a2 * b1 + a3 * b0,
-        ],
-        axis=-1,
-    )
+    product = [
+        a0 * b0 - a1 * b1 - a2 * b2 - a3 * b3,
+        a0 * b1 + a1 * b0 + a2 * b3 - a3 * b2,
+        a0 * b2 - a1 * b3 + a2 * b0 + a3 * b1,
+        a0 * b3 + a1 * b2 - a2 * b1 + a3 * b0,
+    ]
+    return np.stack(product, axis=-1)
 
 
 def quaternion_exp(angle: ArrayLike) -> Array:
@@ -42,14 +40,12 @@ def quaternion_matrix(quaternion: ArrayLike) -> Array:
     """
     h = np.asarray(quaternion, dtype=np.float64)
     h0, h1, h2, h3 = np.moveaxis(h, -1, 0)
-    matrix = np.stack(
-        [
-            np.stack([-h2 * h2 - h3 * h3, h1 * h2 - h3 * h0, h1 * h3 + h2 * h0], axis=-1),
-            np.stack([h1 * h2 + h3 * h0, -h1 * h1 - h3 * h3, h2 * h3 - h1 * h0], axis=-1),
-            np.stack([h1 * h3 - h2 * h0, h2 * h3 + h1 * h0, -h1 * h1 - h2 * h2], axis=-1),
-        ],
-        axis=-2,
-    )
+    entries = [
+        -h2 * h2 - h3 * h3, h1 * h2 - h3 * h0, h1 * h3 + h2 * h0,
+        h1 * h2 + h3 * h0, -h1 * h1 - h3 * h3, h2 * h3 - h1 * h0,
+        h1 * h3 - h2 * h0, h2 * h3 + h1 * h0, -h1 * h1 - h2 * h2,
+    ]  # fmt: skip
+    matrix = np.stack(entries, axis=-1).reshape(*h.shape[:-1], 3, 3)
     return np.eye(3) + 2.0 * matrix / np.sum(h * h, axis=-1)[..., None, None]
 
 
@@ -109,8 +105,7 @@ def screw_translation(angle: ArrayLike, move: ArrayLike) -> Array:
     series = 1 / 6 - t2 / 120 * (1 - t2 / 42 * (1 - t2 / 72 * (1 - t2 / 110)))
     second = np.where(small, series, (safe - np.sin(safe)) / safe**3)
     across = np.cross(angle, move)
-    moved: Array = move + first * across + second * np.cross(angle, across)
-    return moved
+    return move + first * across + second * np.cross(angle, across)
 
 
 def integrate_strain(

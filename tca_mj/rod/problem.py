@@ -8,7 +8,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tca_mj.checks import number, within
+from tca_mj.checks import Checked, NotNegative, number, within
 from tca_mj.rod.beam import BeamSpec
 from tca_mj.rod.errors import RodSolveError
 from tca_mj.rod.lie import matrix_quaternion
@@ -26,11 +26,10 @@ class StrandLaw(Protocol):
 
         The length is that of the whole route, all legs together.
         """
-        ...
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Segment:
+class Segment(Checked):
     """One module of a series: a soft body, its strands and what is rigid at its two ends.
 
     Attributes:
@@ -54,10 +53,11 @@ class Segment:
     _: KW_ONLY
     rotation: ArrayLike = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
     offset: ArrayLike = (0.0, 0.0, 0.0)
-    mass: float = 0.0
+    mass: NotNegative = 0.0
     centre: ArrayLike = (0.0, 0.0, 0.0)
 
     def __post_init__(self) -> None:
+        Checked.__post_init__(self)
         if not isinstance(self.beam, BeamSpec):
             raise ValueError(f"beam must be a BeamSpec, got {self.beam!r}")
         object.__setattr__(self, "routes", _tuple("routes", self.routes))
@@ -74,7 +74,6 @@ class Segment:
         _keep(self, (3, 3), "rotation")
         matrix_quaternion(self.rotation)  # raises unless it is a rotation
         _keep(self, (3,), "offset", "centre")
-        number("mass", self.mass, at_least=0.0, unit="kg")
 
 
 @dataclass(frozen=True, slots=True, eq=False)

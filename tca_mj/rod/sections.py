@@ -49,22 +49,16 @@ class Sections:
     @classmethod
     def joined(cls, parts: "Sequence[Sections]") -> "Sections":
         """All sections of several batches with room for equally many legs."""
-        return cls(
-            *(
-                np.concatenate([getattr(part, field.name) for part in parts])
-                for field in fields(cls)
-            )
-        )
+        names = [field.name for field in fields(cls)]
+        return cls(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
 
     def scaled(self, length: float, force: float) -> "Sections":
         """The same in units of a length and a force."""
         unit = np.array([length] * 3 + [1.0] * 3)
         return replace(
-            self,
-            stiffness=self.stiffness / (force * unit**2),
-            reference=self.reference * unit,
+            self, stiffness=self.stiffness / (force * unit**2), reference=self.reference * unit,
             gradient=self.gradient / unit,
-        )
+        )  # fmt: skip
 
     @property
     def offset(self) -> Array:
@@ -181,9 +175,7 @@ def place(segments: Sequence[Segment], k: int, at: ArrayLike) -> Sections:
     gradient[..., 3:] = np.eye(3)
     stiffness = [*beam.bending, beam.torsion, beam.shearing, beam.shearing, beam.stretching]
     return Sections(
-        stiffness=np.tile(stiffness, (len(s), 1)),
+        stiffness=np.tile(stiffness, (len(s), 1)), strand=strand,
         reference=np.tile([*beam.curvature, 0.0, 0.0, 1.0], (len(s), 1)),
-        gradient=gradient.reshape(len(s), 3 * legs, 6),
-        slope=slope.reshape(len(s), 3 * legs),
-        strand=strand,
-    )
+        gradient=gradient.reshape(len(s), 3 * legs, 6), slope=slope.reshape(len(s), 3 * legs),
+    )  # fmt: skip

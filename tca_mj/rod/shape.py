@@ -53,17 +53,3 @@ class RodShape:
         """
         turn = self.rotation[0].T @ self.rotation[-1]
         return float(np.arctan2(turn[1, 0] - turn[0, 1], turn[0, 0] + turn[1, 1]))
-
-    @property
-    def torsion_angle(self) -> float:
-        """Angle by which the material is twisted from base to tip, the integral of u_z ds [rad].
-
-        In a rod that bends in space it differs from ``twist_angle``, which compares the end
-        sections only. The trapezoid rule over the given points.
-
-        Raises:
-            ValueError: If the shape has no strains.
-        """
-        if self.strain is None:
-            raise ValueError("strain must be known for torsion_angle, got None")
-        return float(np.trapezoid(self.strain[:, 2], self.arc_length))

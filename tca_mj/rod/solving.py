@@ -1,6 +1,7 @@
 """What the solvers of a rod share: the path of growing loads, a nudge, and banded matrices."""
 
 from collections.abc import Callable, Iterable
+from contextlib import suppress
 from typing import Any, TypeVar
 
 import numpy as np
@@ -15,12 +16,10 @@ _NUDGE = 1e-2  # push off an unstable state [rad]
 
 
 def load_up(
-    start: S,
-    solve: Callable[[S, S, float, float], S],
-    fall: Callable[[S, float, float], tuple[float, S]] | None,
-    shortest: float,
+    start: S, solve: Callable[[S, S, float, float], S],
+    fall: Callable[[S, float, float], tuple[float, S]] | None, shortest: float,
     goals: tuple[float, ...] = (1.0,),
-) -> S:
+) -> S:  # fmt: skip
     """Leads a rod from rest to the last of the goals, in steps as long as it can follow.
 
     Args:
@@ -53,6 +52,21 @@ def load_up(
             last, state, taken = state, found, step
             step *= 2.0
     return state
+
+
+def with_finer_meshes(solve: Callable[[int], S]) -> S:
+    """What ``solve`` finds on the first of three meshes that it can, each twice as fine.
+
+    Args:
+        solve: From how many times as fine as the first a mesh is.
+
+    Raises:
+        RodSolveError: From the third.
+    """
+    for finer in (1, 2):
+        with suppress(RodSolveError):
+            return solve(finer)
+    return solve(4)
 
 
 def nudge(nodes: int) -> Array:

@@ -6,6 +6,7 @@ from typing import Any
 
 from numpy.typing import ArrayLike
 
+from tca_mj.checks import require_one_of
 from tca_mj.rod.beam import BeamSpec
 from tca_mj.rod.energy.solver import minimise
 from tca_mj.rod.problem import Segment, StaticProblem, StrandLaw
@@ -77,8 +78,7 @@ def solve_series(
         ValueError: If an argument has a wrong shape, is not finite, or a tension is negative.
         RodSolveError: If no state is found, with what is left of the equations.
     """
-    if solver not in SOLVERS:
-        raise ValueError(f"solver must be one of {SOLVERS}, got {solver!r}")
+    require_one_of("solver", solver, SOLVERS)
     if not isinstance(points, Integral) or points < 2:
         raise ValueError(f"points must be a whole number of at least 2, got {points!r}")
     problem = StaticProblem(segments, tip_force, tip_moment, gravity, shearable)

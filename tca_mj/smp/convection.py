@@ -5,10 +5,12 @@ Only ratios and checks come from here: the loss of a spine is fitted to its natu
 
 import math
 from dataclasses import dataclass
+from functools import partial
+from typing import Annotated
 
 from scipy.optimize import brentq
 
-from tca_mj.checks import number, require_positive
+from tca_mj.checks import Checked, Positive, number, require_positive
 
 _ZERO = 273.15  # 0 °C [K]
 _STEFAN_BOLTZMANN = 5.670374e-8  # [W/(m² K⁴)]
@@ -16,17 +18,14 @@ _GRAVITY = 9.81  # [m/s²]
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
-class Air:
+class Air(Checked):
     """Dry air at atmospheric pressure.
 
     Attributes:
         temperature: Temperature [°C].
     """
 
-    temperature: float
-
-    def __post_init__(self) -> None:
-        number("temperature", self.temperature, at_least=-100.0, at_most=600.0, unit="°C")
+    temperature: Annotated[float, partial(number, at_least=-100.0, at_most=600.0, unit="°C")]
 
     @property
     def expansion(self) -> float:
@@ -114,7 +113,7 @@ def radiation(surface: float, ambient: float, emissivity: float = 0.9) -> float:
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
-class Slab:
+class Slab(Checked):
     """A plate that cools from both faces: the slowest mode of conduction.
 
     Carslaw & Jaeger, Conduction of Heat in Solids, Section 3.11.
@@ -129,16 +128,10 @@ class Slab:
         ValueError: If a number is not positive.
     """
 
-    thickness: float
-    conductivity: float
-    capacity: float
-    coefficient: float
-
-    def __post_init__(self) -> None:
-        require_positive(
-            thickness=self.thickness, conductivity=self.conductivity, capacity=self.capacity,
-            coefficient=self.coefficient,
-        )  # fmt: skip
+    thickness: Positive
+    conductivity: Positive
+    capacity: Positive
+    coefficient: Positive
 
     @property
     def biot(self) -> float:

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tca_mj.checks import Array, floats, number, require_positive, within
+from tca_mj.checks import Array, Checked, Positive, floats, number, within
 from tca_mj.smp.material import SOFT_MODULUS, SmpSpec, SpineSpec
 
 Flags = NDArray[np.bool_]
@@ -22,7 +22,7 @@ STEADY_RATE = math.radians(3.0) / 20.0
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
-class DamageSpec:
+class DamageSpec(Checked):
     """Bounds of the rule.
 
     Attributes:
@@ -39,16 +39,14 @@ class DamageSpec:
         ValueError: If a bound is not finite or not positive, or soft is not below rigid.
     """
 
-    soft_modulus: float = SOFT_MODULUS
-    rigid_modulus: float = 2.25e9
-    steady_rate: float = STEADY_RATE
-    slack: float = 1e-3
+    soft_modulus: Positive = SOFT_MODULUS
+    rigid_modulus: Positive = 2.25e9
+    steady_rate: Positive = STEADY_RATE
+    slack: Positive = 1e-3
 
     def __post_init__(self) -> None:
-        require_positive(
-            rigid_modulus=self.rigid_modulus, steady_rate=self.steady_rate, slack=self.slack
-        )
-        number("soft_modulus", self.soft_modulus, above=0.0, below=self.rigid_modulus, unit="Pa")
+        Checked.__post_init__(self)
+        number("soft_modulus", self.soft_modulus, below=self.rigid_modulus, unit="Pa")
 
     @classmethod
     def of(cls, smp: SmpSpec) -> "DamageSpec":

@@ -11,11 +11,13 @@ the speed of its air, and the time to heat at 25 V, which needs neither C nor R.
 
 import math
 from dataclasses import dataclass
+from functools import partial
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tca_mj.checks import Array, floats, number, require_positive, within
+from tca_mj.checks import Array, Checked, Positives, floats, number, require_positive, within
 from tca_mj.smp.convection import Slab, moving_air, radiation, still_air
 from tca_mj.smp.material import SpineSpec
 from tca_mj.tca import HeatSpec, power_from_voltage
@@ -31,7 +33,7 @@ HOLD_TEMPERATURE = 120.0
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
-class HeaterSpec:
+class HeaterSpec(Checked):
     """Thermal and electrical constants of one spine, or of n spines as arrays of shape (n,).
 
     Attributes:
@@ -45,16 +47,11 @@ class HeaterSpec:
         ValueError: If a number is out of range.
     """
 
-    capacity: float | Array
-    loss: float | Array
-    fan_gain: float | Array
-    resistance: float | Array
-    ambient: float | Array = 25.0
-
-    def __post_init__(self) -> None:
-        HeatSpec(capacity=self.capacity, loss=self.loss, ambient=self.ambient)
-        within("fan_gain", self.fan_gain, at_least=1.0)
-        within("resistance", self.resistance, above=0.0, unit="ohm")
+    capacity: Positives
+    loss: Positives
+    fan_gain: Annotated[float | Array, partial(within, at_least=1.0)]
+    resistance: Positives
+    ambient: Annotated[float | Array, partial(within, above=-273.15, unit="°C")] = 25.0
 
     @classmethod
     def fitted(
@@ -88,12 +85,10 @@ class HeaterSpec:
         excess = hold_temperature - ambient
         loss = spine.heat_capacity * math.log(excess / (COOL_TO - ambient)) / cool_time
         return cls(
-            capacity=spine.heat_capacity,
-            loss=loss,
+            capacity=spine.heat_capacity, loss=loss,
             fan_gain=fan_gain(spine, fan_speed, hold_temperature, ambient),
-            resistance=hold_voltage**2 / (loss * excess),
-            ambient=ambient,
-        )
+            resistance=hold_voltage**2 / (loss * excess), ambient=ambient,
+        )  # fmt: skip
 
     def heat(self, fan: ArrayLike = False) -> HeatSpec:
         """The heat balance with the fan on or off, shape (..., n)."""
@@ -201,11 +196,9 @@ def fan_gain(spine: SpineSpec, speed: float, start: float, ambient: float) -> fl
 
     def time(convection: float) -> float:
         slab = Slab(
-            thickness=spine.thickness,
-            conductivity=spine.smp.conductivity,
-            capacity=spine.smp.density * spine.smp.specific_heat,
-            coefficient=convection + radiated,
-        )
+            thickness=spine.thickness, conductivity=spine.smp.conductivity,
+            capacity=spine.smp.density * spine.smp.specific_heat, coefficient=convection + radiated,
+        )  # fmt: skip
         return slab.centre_time(ratio)
 
     return time(natural) / time(forced)

@@ -5,7 +5,7 @@ chain of links must agree with, and serves the tests and figures of sequences.
 """
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -15,7 +15,7 @@ from tca_mj.smp.fixing import SpineState, advance, spring
 from tca_mj.smp.heater import HeaterSpec, HeaterState, heat_spine
 from tca_mj.smp.material import SpineSpec
 from tca_mj.tca import Pull, TcaBank, TcaSpec, TcaState
-from tca_mj.tca.embedding import silicone_body
+from tca_mj.tca.embedding import in_silicone
 
 # Outer diameter of the silicone tube round the TCA: an estimate, half the module's 5 mm [m].
 TUBE_DIAMETER = 2.5e-3
@@ -34,11 +34,8 @@ def in_tube(tca: TcaSpec, touching: float = 0.0) -> TcaSpec:
             loosely there, as it shrinks into the tube in its training (Sun, Section 6.1.1).
     """
     radius = 0.5 * TUBE_DIAMETER
-    body = silicone_body(
-        tca, section=math.pi * (radius**2 - tca.outer_radius**2),
-        perimeter=2.0 * math.pi * radius, touching=touching,
-    )  # fmt: skip
-    return replace(tca, body=body)
+    section, perimeter = math.pi * (radius**2 - tca.outer_radius**2), 2.0 * math.pi * radius
+    return in_silicone(tca, section=section, perimeter=perimeter, touching=touching)
 
 
 def sheathed(tca: TcaSpec, spine: SpineSpec) -> TcaSpec:
@@ -83,11 +80,7 @@ class LumpedModule:
     """
 
     def __init__(
-        self,
-        spine: SpineSpec,
-        heater: HeaterSpec,
-        tca: TcaSpec,
-        damage: DamageSpec | None = None,
+        self, spine: SpineSpec, heater: HeaterSpec, tca: TcaSpec, damage: DamageSpec | None = None
     ) -> None:
         """Combines a spine, its heater and a TCA of about twice the spine's length."""
         self.spine = spine
@@ -110,11 +103,9 @@ class LumpedModule:
         return ModuleState(
             heater=heater,
             spine=SpineState.rest(self.spine.smp, np.full(1, memory), heater.temperature),
-            tca=self.bank.rest(),
-            angle=np.full(1, memory),
-            tension=np.zeros(1),
+            tca=self.bank.rest(), angle=np.full(1, memory), tension=np.zeros(1),
             damage=Damage(flags, flags, flags),
-        )
+        )  # fmt: skip
 
     def tca_length(self, angle: Array) -> Array:
         """Length of the TCA at an angle, both legs on the inner side, shape (1,) [m]."""
@@ -125,14 +116,9 @@ class LumpedModule:
         return float(self.bank.resistance(state.tca, self.tca_length(state.angle))[0])
 
     def step(
-        self,
-        state: ModuleState,
-        heater_voltage: float,
-        tca_power: float,
-        fan: bool,
-        dt: float,
+        self, state: ModuleState, heater_voltage: float, tca_power: float, fan: bool, dt: float,
         moment: float = 0.0,
-    ) -> ModuleState:
+    ) -> ModuleState:  # fmt: skip
         """Advances by ``dt``: heat exactly, shape fixing at the old angle, then the balance.
 
         Args:
@@ -155,13 +141,10 @@ class LumpedModule:
         angle, pull = self._balance(spine, tca, after, state.angle, moment)
         rise = (after.tension - before.tension) / dt if dt > 0.0 else np.zeros(1)
         tension = np.maximum(pull.tension, 0.0)
-        damage = flag_damage(
-            modulus=spring(self.spine.smp, spine).modulus,
-            cooling=heater.temperature < state.heater.temperature,
-            tension=np.maximum(after.tension, 0.0),
-            bending_rate=soft_bending_rate(self.spine, rise),
-            spec=self.damage,
-        )
+        modulus, _ = spring(self.spine.smp, spine)
+        cooling = heater.temperature < state.heater.temperature
+        rate = soft_bending_rate(self.spine, rise)
+        damage = flag_damage(modulus, cooling, np.maximum(after.tension, 0.0), rate, self.damage)
         return ModuleState(heater, spine, tca, angle, tension, damage)
 
     def _balance(

@@ -7,14 +7,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.special import expit
 
-from tca_mj.checks import Array, number, require_positive, within
+from tca_mj.checks import Array, Checked, Finite, Positive, number, require_positive, within
 
 # Above 110 °C the modulus is below this, Sun, dissertation, Colorado State University, 6.1.3 [Pa].
 SOFT_MODULUS = 50e6
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
-class SmpSpec:
+class SmpSpec(Checked):
     """A shape-memory epoxy: Epon 828 with 6 wt% diethylaminopropylamine (Sun, Section 6.1.1).
 
     The logarithm of the modulus falls from glassy to rubbery along a sigmoid about the middle of
@@ -37,22 +37,18 @@ class SmpSpec:
         ValueError: If a number is out of range.
     """
 
-    glassy: float = 2.5e9
-    rubbery: float = 6e6
+    glassy: Positive = 2.5e9
+    rubbery: Positive = 6e6
     rigid_below: float = 80.0
-    soft_above: float = 110.0
+    soft_above: Finite = 110.0
     rigid_share: float = 0.9
-    density: float = 1160.0
-    specific_heat: float = 1300.0
-    conductivity: float = 0.2
+    density: Positive = 1160.0
+    specific_heat: Positive = 1300.0
+    conductivity: Positive = 0.2
 
     def __post_init__(self) -> None:
-        require_positive(
-            glassy=self.glassy, rubbery=self.rubbery, density=self.density,
-            specific_heat=self.specific_heat, conductivity=self.conductivity,
-        )  # fmt: skip
+        Checked.__post_init__(self)
         number("rubbery", self.rubbery, below=self.glassy, unit="Pa")
-        number("soft_above", self.soft_above, unit="°C")
         number("rigid_below", self.rigid_below, above=-273.15, below=self.soft_above, unit="°C")
         half = math.sqrt(self.rubbery / self.glassy)  # what is left at the middle
         number("rigid_share", self.rigid_share, above=half, below=1.0)
@@ -101,7 +97,7 @@ class SmpSpec:
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
-class SpineSpec:
+class SpineSpec(Checked):
     """The spine of the bending morphing module, and where its TCA runs.
 
     Sun, Section 6.1.1, prints the module's 115 x 6.5 x 5 mm and neither the spine's section nor
@@ -123,17 +119,14 @@ class SpineSpec:
     """
 
     smp: SmpSpec = field(default_factory=SmpSpec)
-    length: float = 115e-3
-    width: float = 6.5e-3
-    thickness: float = 2.5e-3
-    module_height: float = 5e-3
-    tca_offset: float = 2.5e-3
+    length: Positive = 115e-3
+    width: Positive = 6.5e-3
+    thickness: Positive = 2.5e-3
+    module_height: Positive = 5e-3
+    tca_offset: Positive = 2.5e-3
 
     def __post_init__(self) -> None:
-        require_positive(
-            length=self.length, width=self.width, thickness=self.thickness,
-            module_height=self.module_height, tca_offset=self.tca_offset,
-        )  # fmt: skip
+        Checked.__post_init__(self)
         number("thickness", self.thickness, at_most=self.module_height, unit="m")
 
     @property

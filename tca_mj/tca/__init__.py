@@ -8,7 +8,9 @@ from tca_mj.tca.dynamics.stepping import LoadedTcas, MotionSolveError
 from tca_mj.tca.fibre.boundary import FibreShape, Stiffness, fibre_stiffness, solve_fibre
 from tca_mj.tca.fibre.centreline import CONICAL, Centreline, ConicalTca
 from tca_mj.tca.laws.creep import CreepBank, CreepSpec, CreepState
-from tca_mj.tca.laws.rod import CoilRods, CoilShape, CoilSolveError, coil_tension
+from tca_mj.tca.laws.law import LawChoice, TensionLaw
+from tca_mj.tca.laws.rod import CoilRods, CoilShape, coil_tension
+from tca_mj.tca.laws.roots import CoilSolveError
 from tca_mj.tca.laws.statics import hanging_length, law_at, tension
 from tca_mj.tca.laws.surface import CoilSurfaces
 from tca_mj.tca.laws.table import CalibrationError, Surface, SurfaceBound, calibrate
@@ -29,10 +31,10 @@ __all__ = [
     "BodyHeat", "CATALOGUE", "CONICAL", "MODULE_TCAS", "CalibrationError", "Centreline",
     "CoilRods", "CoilShape", "CoilSolveError", "CoilSurfaces", "ConicalTca", "CreepBank",
     "CreepSpec", "CreepState", "FREE_STROKE_CREPT", "FibreShape", "FibreSpec", "FibreTable",
-    "HeatSpec", "HeatStep", "Heating", "Load", "LoadState", "LoadedTcas", "MotionSolveError",
-    "Pull", "Stiffness", "Supply", "Surface", "SurfaceBound", "TcaBank", "TcaMelted", "TcaSpec",
-    "TcaState", "Thermostat", "WireTable", "calibrate", "coil_tension", "fibre_stiffness",
-    "hanging_length", "heat_lost", "law_at", "power_from_voltage", "radial_growth",
-    "resistance", "sensed_length", "softened_tension", "softening", "solve_course",
-    "solve_fibre", "step_temperature", "tension", "untwist",
+    "HeatSpec", "HeatStep", "Heating", "Load", "LoadState", "LawChoice", "LoadedTcas",
+    "MotionSolveError", "Pull", "Stiffness", "Supply", "Surface", "SurfaceBound", "TcaBank",
+    "TcaMelted", "TcaSpec", "TcaState", "TensionLaw", "Thermostat", "WireTable", "calibrate",
+    "coil_tension", "fibre_stiffness", "hanging_length", "heat_lost", "law_at",
+    "power_from_voltage", "radial_growth", "resistance", "sensed_length", "softened_tension",
+    "softening", "solve_course", "solve_fibre", "step_temperature", "tension", "untwist",
 ]  # fmt: skip

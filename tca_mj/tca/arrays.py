@@ -1,9 +1,9 @@
 """Arrays of the numbers of n objects, and dataclasses of arrays, stacked and taken apart."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import fields, is_dataclass
 from functools import cache
-from typing import Any, TypeVar, cast
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -30,26 +30,26 @@ def stacked(values: Sequence[Value]) -> Value:
 
     Fields that are dataclasses themselves, or tuples of them, are stacked alike.
     """
-    first: Any = values[0]
-    if isinstance(first, tuple):
-        several = cast(Any, values)
-        return cast(Value, tuple(stacked(each) for each in zip(*several, strict=True)))
-    if not is_dataclass(first):
-        return cast(Value, np.stack(cast(Any, values)))
-    kind: Any = type(first)
-    parts = {name: stacked([getattr(value, name) for value in values]) for name in _names(kind)}
-    return cast(Value, kind(**parts))
+    return _mapped(lambda *each: np.stack(each), *values)
 
 
 def row(values: Value, i: int) -> Value:
-    """The ``i``-th of what ``stacked`` has made one, of fields that need no names."""
-    every: Any = values
-    if isinstance(every, tuple):
-        return cast(Value, tuple(row(each, i) for each in every))
-    if not is_dataclass(every):
-        return cast(Value, every[i])
-    kind: Any = type(every)
-    return cast(Value, kind(*[row(getattr(every, name), i) for name in _names(kind)]))
+    """The ``i``-th of what ``stacked`` has made one."""
+    return _mapped(lambda each: each[i], values)
+
+
+def _mapped(function: Callable[..., Any], *values: Any) -> Any:
+    """``function`` of the arrays that stand at the same place in each of the values."""
+    first = values[0]
+    if isinstance(first, tuple):
+        return tuple(_mapped(function, *each) for each in zip(*values, strict=True))
+    if not is_dataclass(first):
+        return function(*values)
+    kind: Any = type(first)
+    return kind(
+        **{name: _mapped(function, *[getattr(each, name) for each in values])
+           for name in _names(kind)}
+    )  # fmt: skip
 
 
 @cache

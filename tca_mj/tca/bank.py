@@ -1,20 +1,24 @@
 """n TCAs advanced together: heat in, temperature and pull out."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tca_mj.checks import Array, floats, within
 from tca_mj.tca.arrays import column, frozen
+from tca_mj.tca.laws.law import LawChoice, TensionLaw
 from tca_mj.tca.laws.rod import CoilRods
 from tca_mj.tca.laws.surface import CoilSurfaces
 from tca_mj.tca.sensing.wire import WireTable, resistance
 from tca_mj.tca.spec import TcaSpec, heat_of
 from tca_mj.tca.supply import UNITS, Supply
 from tca_mj.tca.thermal import HeatStep, power_from_voltage
+
+_LAWS: dict[str, Callable[[Sequence[TcaSpec]], TensionLaw]]
+_LAWS = {"rod": CoilRods, "surface": CoilSurfaces}
 
 
 class Signal(NamedTuple):
@@ -114,13 +118,14 @@ class TcaBank:
 
     kind = "TCA"
 
-    def __init__(self, specs: Sequence[TcaSpec], law: Literal["rod", "surface"] = "rod") -> None:
+    def __init__(self, specs: Sequence[TcaSpec], law: LawChoice = "rod") -> None:
         """Gathers the constants of ``specs``, and their surfaces if ``law`` needs them.
 
         Args:
             specs: The TCAs, at least one.
             law: "rod" solves rod theory anew each time; "surface" reads it from a table with a
                 known error (``surface.SurfaceBound``), made on first use: a third of the time.
+                A law of one's own is what makes a ``TensionLaw`` of the specs.
 
         Raises:
             ValueError: If ``specs`` is empty or there is no such ``law``.
@@ -128,11 +133,10 @@ class TcaBank:
         """
         self.specs = tuple(specs)
         self.n = len(self.specs)
-        if law not in ("rod", "surface"):
+        if not callable(law) and law not in _LAWS:
             raise ValueError(f"law must be 'rod' or 'surface', got {law!r}")
         self.law = law
-        self._coils: CoilRods | CoilSurfaces
-        self._coils = CoilSurfaces(self.specs) if law == "surface" else CoilRods(self.specs)
+        self._coils = (law if callable(law) else _LAWS[law])(self.specs)
         self._wire = WireTable.of(self.specs)
         self.heat = heat_of(self.specs)
         self.supply = Supply()
@@ -167,11 +171,9 @@ class TcaBank:
         shape = (*batch_shape, self.n)
         ambient = np.broadcast_to(self.heat.ambient, shape)
         return TcaState(
-            temperature=ambient.copy(),
-            body=ambient.copy(),
-            energy_in=np.zeros(shape),
+            temperature=ambient.copy(), body=ambient.copy(), energy_in=np.zeros(shape),
             energy_lost=np.zeros(shape),
-        )
+        )  # fmt: skip
 
     def steady(self, temperature: ArrayLike) -> tuple[TcaState, Array]:
         """TCAs that have been at ``temperature`` for long, and the power that keeps them there.

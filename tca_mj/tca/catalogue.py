@@ -56,27 +56,20 @@ def _type(natural: float, contact: float = 0.350 * math.sin(math.radians(11.53))
     0: 11.53°, 70 mm. Resistance and loss are those of Chapter 2, see above.
     """
     return TcaSpec(
-        fibre=_THREAD_2,
-        fibre_length=0.350,
-        coil_radius=0.37e-3,
-        pitch_angle=math.asin(natural / 0.350),
-        minimum_pitch_angle=math.asin(contact / 0.350),
-        resistance_per_length=_THREAD_OHMS / natural,
-        stretch_resistance=0.55 / _THREAD_OHMS / 0.5,
+        fibre=_THREAD_2, fibre_length=0.350, coil_radius=0.37e-3,
+        pitch_angle=math.asin(natural / 0.350), minimum_pitch_angle=math.asin(contact / 0.350),
+        resistance_per_length=_THREAD_OHMS / natural, stretch_resistance=0.55 / _THREAD_OHMS / 0.5,
         heat_loss=_AIR_LOSS,
-    )
+    )  # fmt: skip
 
 
 # Sun, Table 3.2, free-stroke: 175 mm of fibre made at 22.42° with a coil radius of 0.408 mm.
 # The coils touch at the close packing of that helix, asin(fibre diameter / (2 pi r)) = 9.43°:
 # 36 % below the natural length of 45 mm, like the measured 35.7 % of type 2-180 (Table 2.1).
 _FREE_STROKE_MADE = TcaSpec(
-    fibre=_THREAD_3,
-    fibre_length=0.175,
-    coil_radius=0.408e-3,
-    pitch_angle=math.radians(22.42),
+    fibre=_THREAD_3, fibre_length=0.175, coil_radius=0.408e-3, pitch_angle=math.radians(22.42),
     minimum_pitch_angle=math.asin(0.42 / (2.0 * math.pi * 0.408)),
-)
+)  # fmt: skip
 # The same at its natural length of 45 mm: 14.90°; the number of coils is kept, so that
 # r = 0.408 mm cos(14.90°)/cos(22.42°) = 0.427 mm.
 _FREE_STROKE = replace(
@@ -90,13 +83,10 @@ _FREE_STROKE = replace(
 # packing. Breaking force: an estimate from the 240 g under which the thread is twisted, above
 # which it "may easily break" (Section 2.1.1).
 _SELF_COILED = TcaSpec(
-    fibre=FibreSpec(untwist_scale=1.6),
-    fibre_length=0.175,
-    coil_radius=0.227e-3,
-    pitch_angle=math.radians(18.66),
-    minimum_pitch_angle=math.asin(0.42 / (2.0 * math.pi * 0.227)),
+    fibre=FibreSpec(untwist_scale=1.6), fibre_length=0.175, coil_radius=0.227e-3,
+    pitch_angle=math.radians(18.66), minimum_pitch_angle=math.asin(0.42 / (2.0 * math.pi * 0.227)),
     breaking_force=0.240 * 9.81,
-)
+)  # fmt: skip
 
 # The free-stroke TCA after it has crept under a weight in grams, which is its reference under that
 # weight: pitch angles in the code published with Sun et al., github.com/jiefengsun/TCA-TRO. 15°

@@ -18,6 +18,7 @@ per cent (``tests/test_embedding.py`` compares with the diffusion of heat in the
 """
 
 import math
+from dataclasses import replace
 
 from tca_mj.checks import number, require_positive
 from tca_mj.tca.spec import TcaSpec
@@ -62,6 +63,14 @@ def silicone_body(
         capacity=SILICONE_DENSITY * SILICONE_SPECIFIC_HEAT * section,
         loss=BODY_TO_AIR * perimeter,
     )
+
+
+def in_silicone(
+    tca: TcaSpec, *, section: float, perimeter: float, touching: float = 0.0
+) -> TcaSpec:
+    """A TCA with the silicone round it; arguments and errors as ``silicone_body``."""
+    body = silicone_body(tca, section=section, perimeter=perimeter, touching=touching)
+    return replace(tca, body=body)
 
 
 def ring_conductance(inner: float, outer: float) -> float:

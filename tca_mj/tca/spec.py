@@ -9,9 +9,10 @@ its own and does not follow from the radius, which is the one that the moduli we
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
-from typing import Literal
+from functools import partial
+from typing import Annotated, Literal
 
-from tca_mj.checks import number, require_positive, within
+from tca_mj.checks import Checked, NotNegative, Positive, Temperature, Triple, number, within
 from tca_mj.tca.arrays import column
 from tca_mj.tca.mandrel import BRILL_TRANSITION, kept_share
 from tca_mj.tca.thermal import BodyHeat, HeatSpec
@@ -21,7 +22,7 @@ _UPRIGHT = math.pi / 2.0  # pitch of a straight fibre [rad]
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
-class FibreSpec:
+class FibreSpec(Checked):
     """The twisted fibre (thread) of a TCA. Defaults: Sun, Tables 3.1 and Section 3.2.2.
 
     Attributes:
@@ -56,33 +57,25 @@ class FibreSpec:
             choice, not settled by the source: "cold" is an assumption.
     """
 
-    radius: float = 0.21e-3
-    young: float = 1.2e9
-    shear: float = 0.22e9
-    filament_young: float = 3.9e9
+    radius: Positive = 0.21e-3
+    young: Positive = 1.2e9
+    shear: Positive = 0.22e9
+    filament_young: Positive = 3.9e9
     softening: float = 0.0011e9
-    load_softening: tuple[float, float, float] = (0.0, 0.0, 1.0)
-    inserted_twist: float = 4710.0
-    untwist_scale: float = 1.0
-    expansion: tuple[float, float, float] = (3.5e-6, -6.7e-5, 1.0)
-    line_density: float = 4 * 23.5e-6 * 218.0 / 175.0
-    specific_heat: float = 1267.0
+    load_softening: Triple = (0.0, 0.0, 1.0)
+    inserted_twist: NotNegative = 4710.0
+    untwist_scale: NotNegative = 1.0
+    expansion: Triple = (3.5e-6, -6.7e-5, 1.0)
+    line_density: Positive = 4 * 23.5e-6 * 218.0 / 175.0
+    specific_heat: Positive = 1267.0
     reference_temperature: float = 25.0
     temperature_range: tuple[float, float] = (25.0, 160.0)
     melting_temperature: float = 260.0
     section: Literal["cold", "hot"] = "cold"
 
     def __post_init__(self) -> None:
-        require_positive(
-            radius=self.radius, young=self.young, shear=self.shear, line_density=self.line_density,
-            filament_young=self.filament_young, specific_heat=self.specific_heat,
-        )  # fmt: skip
-        for name in ("inserted_twist", "untwist_scale"):
-            number(name, getattr(self, name), at_least=0.0)
-        if self.section not in ("cold", "hot"):
-            raise ValueError(f"section must be 'cold' or 'hot', got {self.section!r}")
-        mu2, mu1, mu0 = within("load_softening", self.load_softening, shape=(3,))
-        c2, c1, c0 = within("expansion", self.expansion, shape=(3,))
+        Checked.__post_init__(self)
+        (mu2, mu1, mu0), (c2, c1, c0) = self.load_softening, self.expansion
         low, high = within("temperature_range", self.temperature_range, shape=(2,),
                            above=_ABSOLUTE_ZERO)  # fmt: skip
         reference = number("reference_temperature", self.reference_temperature)
@@ -132,7 +125,7 @@ class FibreSpec:
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
-class TcaSpec:
+class TcaSpec(Checked):
     """One TCA: a fibre wound to a helix, and its heat and resistance.
 
     Attributes:
@@ -162,32 +155,24 @@ class TcaSpec:
     """
 
     fibre: FibreSpec
-    fibre_length: float
+    fibre_length: Positive
     coil_radius: float
-    pitch_angle: float
+    pitch_angle: Annotated[float, partial(number, above=0.0, below=_UPRIGHT)]
     minimum_pitch_angle: float
-    breaking_force: float = 0.78
-    resistance_per_length: float = 67.0
+    breaking_force: Positive = 0.78
+    resistance_per_length: Positive = 67.0
     stretch_resistance: float = 0.55 / (67.0 * 0.110) / 0.5
-    contraction_resistance: float = 0.20 / 0.357
-    heat_loss: float = 23.0 * 2.5 * 2.0 * math.pi * 0.21e-3
-    ambient: float = 25.0
+    contraction_resistance: NotNegative = 0.20 / 0.357
+    heat_loss: Positive = 23.0 * 2.5 * 2.0 * math.pi * 0.21e-3
+    ambient: Temperature = 25.0
     body: BodyHeat | None = None
-    contact_ratio: float = 50.0
-    contact_smoothing: float = 0.005
+    contact_ratio: Positive = 50.0
+    contact_smoothing: Annotated[float, partial(number, above=0.0, below=1.0)] = 0.005
 
     def __post_init__(self) -> None:
-        require_positive(
-            fibre_length=self.fibre_length, breaking_force=self.breaking_force,
-            resistance_per_length=self.resistance_per_length, heat_loss=self.heat_loss,
-            contact_ratio=self.contact_ratio,
-        )  # fmt: skip
+        Checked.__post_init__(self)
         number("coil_radius (spring index above 1)", self.coil_radius, above=self.fibre.radius)
-        number("pitch_angle", self.pitch_angle, above=0.0, below=_UPRIGHT)
         number("minimum_pitch_angle", self.minimum_pitch_angle, above=0.0, below=self.pitch_angle)
-        number("ambient", self.ambient, above=_ABSOLUTE_ZERO)
-        number("contact_smoothing", self.contact_smoothing, above=0.0, below=1.0)
-        number("contraction_resistance", self.contraction_resistance, at_least=0.0)
         if not isinstance(self.body, BodyHeat | None):
             raise ValueError(f"body must be a BodyHeat or None, got {self.body!r}")
         stretch = max(1.0 / math.sin(self.pitch_angle) - 1.0, 1e-300)  # there no resistance is left
@@ -225,7 +210,8 @@ class TcaSpec:
         Raises:
             ValueError: If a number is out of range or the coils touch (annealed too cold).
         """
-        require_positive(fibre_length=fibre_length, core_diameter=core_diameter)
+        number("fibre_length", fibre_length, above=0.0)
+        number("core_diameter", core_diameter, above=0.0)
         number("groove_pitch_angle", groove_pitch_angle, above=0.0, below=_UPRIGHT)
         radius = 0.5 * core_diameter + fibre.radius
         if minimum_pitch_angle is None:
@@ -237,13 +223,11 @@ class TcaSpec:
                    below=fibre.melting_temperature)  # fmt: skip
             kept = kept_share(groove_pitch_angle, annealing_temperature)
         contact, made = math.sin(minimum_pitch_angle), math.sin(groove_pitch_angle)
-        return cls(
-            fibre=fibre,
-            fibre_length=fibre_length,
-            coil_radius=radius,
-            pitch_angle=groove_pitch_angle,
-            minimum_pitch_angle=minimum_pitch_angle,
-        ).of_pitch(math.asin(contact + kept * (made - contact)))
+        coil = cls(
+            fibre=fibre, fibre_length=fibre_length, coil_radius=radius,
+            pitch_angle=groove_pitch_angle, minimum_pitch_angle=minimum_pitch_angle,
+        )  # fmt: skip
+        return coil.of_pitch(math.asin(contact + kept * (made - contact)))
 
     @property
     def rest_length(self) -> float:
@@ -295,7 +279,7 @@ class TcaSpec:
 
     def of_length(self, rest_length: float) -> "TcaSpec":
         """A piece of the same coil (in the same body) with another natural length [m]."""
-        require_positive(rest_length=rest_length)
+        number("rest_length", rest_length, above=0.0)
         return replace(self, fibre_length=rest_length / self.rest_length * self.fibre_length)
 
     def of_pitch(self, pitch_angle: float) -> "TcaSpec":

@@ -13,7 +13,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tca_mj.checks import Array, within
+from tca_mj.checks import Array, Checked, Positives, within
 from tca_mj.tca.thermal import HeatSpec, power_from_voltage
 
 Quantity = Literal["power", "voltage", "current", "temperature"]
@@ -21,7 +21,7 @@ UNITS: dict[Quantity, str] = {"power": "W", "voltage": "V", "current": "A", "tem
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
-class Thermostat:
+class Thermostat(Checked):
     """Power that brings TCAs to a temperature: what keeps T* + C (T* - T)/τ, within limits.
 
     What keeps a bare TCA is λ (T* - T_amb); one in a soft body also warms that, G (T* - T_body).
@@ -37,15 +37,9 @@ class Thermostat:
     """
 
     heat: HeatSpec
-    max_power: float | Array
-    response: float = 0.4
-    max_temperature: float = 175.0
-
-    def __post_init__(self) -> None:
-        for name in ("max_power", "response", "max_temperature"):
-            value = np.asarray(getattr(self, name), dtype=np.float64)
-            if not (np.isfinite(value) & (value > 0.0)).all():
-                raise ValueError(f"{name} must be finite and above 0, got {value}")
+    max_power: Positives
+    response: Positives = 0.4
+    max_temperature: Positives = 175.0
 
     def power(
         self, temperature: ArrayLike, target: ArrayLike, body: ArrayLike | None = None
@@ -64,7 +58,7 @@ class Thermostat:
 
 
 @dataclass(frozen=True, kw_only=True, slots=True, eq=False)
-class Supply:
+class Supply(Checked):
     """How the TCAs of a simulation are driven.
 
     With ``temperature`` a thermostat holds each TCA there, as often as the TCAs are updated. A
@@ -89,8 +83,7 @@ class Supply:
     thermostat: Thermostat | None = None
 
     def __post_init__(self) -> None:
-        if self.quantity not in UNITS:
-            raise ValueError(f"quantity must be one of {list(UNITS)}, got {self.quantity!r}")
+        Checked.__post_init__(self)
         for name in ("max_power", "max_voltage", "max_current"):
             limit = np.asarray(getattr(self, name), dtype=np.float64)
             if not (limit > 0.0).all():
@@ -144,9 +137,6 @@ class Supply:
 
     def like(self, other: "Supply") -> bool:
         """Whether another supply does the same."""
-        same = (
-            np.array_equal(np.asarray(getattr(self, name)), np.asarray(getattr(other, name)))
-            for name in ("max_power", "max_voltage", "max_current")
-        )
-        mine, others = self.thermostat, other.thermostat
-        return self.quantity == other.quantity and all(same) and repr(mine) == repr(others)
+        same = self.quantity == other.quantity and repr(self.thermostat) == repr(other.thermostat)
+        limits = ("max_power", "max_voltage", "max_current")
+        return same and all(np.array_equal(getattr(self, m), getattr(other, m)) for m in limits)

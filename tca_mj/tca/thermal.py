@@ -11,16 +11,17 @@ C + C_b and loss λ + λ_b.
 """
 
 from dataclasses import dataclass
-from typing import NamedTuple, Self
+from functools import partial
+from typing import Annotated, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tca_mj.checks import Array, floats, number, require_positive, within
+from tca_mj.checks import Array, Checked, NotNegatives, Positive, Positives, floats, number, within
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
-class HeatSpec:
+class HeatSpec(Checked):
     """Lumped thermal constants of one TCA, or of n TCAs as arrays of shape (n,).
 
     Attributes:
@@ -36,19 +37,15 @@ class HeatSpec:
         ValueError: If a number is out of range, or heat cannot leave the TCA.
     """
 
-    capacity: float | Array
-    loss: float | Array
-    ambient: float | Array = 25.0
-    conductance: float | Array = 0.0
-    body_capacity: float | Array = 1.0
-    body_loss: float | Array = 0.0
+    capacity: Positives
+    loss: NotNegatives
+    ambient: Annotated[float | Array, partial(within, above=-273.15, unit="°C")] = 25.0
+    conductance: NotNegatives = 0.0
+    body_capacity: Positives = 1.0
+    body_loss: NotNegatives = 0.0
 
     def __post_init__(self) -> None:
-        within("ambient", self.ambient, above=-273.15, unit="°C")
-        for name in ("capacity", "body_capacity"):
-            within(name, getattr(self, name), above=0.0)
-        for name in ("loss", "conductance", "body_loss"):
-            within(name, getattr(self, name), at_least=0.0)
+        Checked.__post_init__(self)
         within("loss + conductance", np.add(self.loss, self.conductance), above=0.0)
 
     @property
@@ -93,7 +90,7 @@ class HeatSpec:
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
-class BodyHeat:
+class BodyHeat(Checked):
     """The soft body round a TCA, per natural length of the TCA.
 
     Attributes:
@@ -105,12 +102,9 @@ class BodyHeat:
         ValueError: If a number is not finite and positive.
     """
 
-    conductance: float
-    capacity: float
-    loss: float
-
-    def __post_init__(self) -> None:
-        require_positive(conductance=self.conductance, capacity=self.capacity, loss=self.loss)
+    conductance: Positive
+    capacity: Positive
+    loss: Positive
 
 
 class HeatStep(NamedTuple):
@@ -240,8 +234,7 @@ def step_temperature(temperature: ArrayLike, power: ArrayLike, heat: HeatSpec, d
         ValueError: If a power is negative (a heater cannot cool), if ``dt`` is negative, if there
             is a body, or if any of the numbers is not finite.
     """
-    temperature, power = _checked(temperature, power, heat, dt)
-    return bare_step(temperature, power, heat.capacity, heat.loss, heat.ambient, dt)[0]
+    return _bare(temperature, power, heat, dt)[0]
 
 
 def heat_lost(temperature: ArrayLike, power: ArrayLike, heat: HeatSpec, dt: float) -> Array:
@@ -262,18 +255,13 @@ def heat_lost(temperature: ArrayLike, power: ArrayLike, heat: HeatSpec, dt: floa
     Raises:
         ValueError: As ``step_temperature``.
     """
-    temperature, power = _checked(temperature, power, heat, dt)
-    return bare_step(temperature, power, heat.capacity, heat.loss, heat.ambient, dt)[1]
+    return _bare(temperature, power, heat, dt)[1]
 
 
 def bare_step(
-    temperature: Array,
-    power: Array,
-    capacity: float | Array,
-    loss: float | Array,
-    ambient: float | Array,
-    dt: float,
-) -> tuple[Array, Array]:
+    temperature: Array, power: Array, capacity: float | Array, loss: float | Array,
+    ambient: float | Array, dt: float,
+) -> tuple[Array, Array]:  # fmt: skip
     """Both of these at once: temperature at the end [°C] and heat lost [J]. Nothing is checked."""
     # The start's excess dies out, the power's builds up: T - T_amb = x e + (P/λ) (1 - e).
     fading = np.expm1(-dt * loss / capacity)
@@ -311,9 +299,11 @@ def power_from_voltage(voltage: ArrayLike, resistance: ArrayLike) -> Array:
         return within("voltage^2/resistance", voltage * voltage / resistance)
 
 
-def _checked(
+def _bare(
     temperature: ArrayLike, power: ArrayLike, heat: HeatSpec, dt: float
 ) -> tuple[Array, Array]:
     number("dt", dt, at_least=0.0, unit="s")
     require_bare(heat)
-    return within("temperature", temperature), within("power", power, at_least=0.0, unit="W")
+    power = within("power", power, at_least=0.0, unit="W")
+    temperature = within("temperature", temperature)
+    return bare_step(temperature, power, heat.capacity, heat.loss, heat.ambient, dt)

@@ -9,7 +9,7 @@ The verdict on the reported angles is by eq. (4.1), standing: see docs/studies.m
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from types import MappingProxyType
 from typing import NamedTuple
 
@@ -92,8 +92,7 @@ def by_place(tip: ArrayLike, length: float) -> Bend:
     return Bend(float(min(ends)[1]), direction)
 
 
-@dataclass(frozen=True, slots=True)
-class Bent:
+class Bent(NamedTuple):
     """The module after 2 s of power in an attitude, angles in degrees.
 
     Attributes:
@@ -116,12 +115,9 @@ class Bent:
 
 
 def bent(
-    attitude: str,
-    power: tuple[float, float],
-    *,
-    contact: float = CHANNEL_CONTACT,
+    attitude: str, power: tuple[float, float], *, contact: float = CHANNEL_CONTACT,
     weight: float = BendingSpec().diameter,
-) -> Bent:
+) -> Bent:  # fmt: skip
     """Rests in an attitude, then heats TCAs 1 and 2 for 2 s from the cold.
 
     Args:

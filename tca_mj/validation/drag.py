@@ -8,7 +8,7 @@ mass is not printed: that of the kettle per TCA, 2 kg/5, is taken.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from scipy.optimize import brentq
@@ -31,8 +31,7 @@ _HEATING = 50.0  # how fast the TCA is heated in the figure, an estimate [K/s]
 _STEP = 1e-3  # [s]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Dragged:
+class Dragged(NamedTuple):
     """A weight dragged from rest; arrays of shape (k,).
 
     Attributes:

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from tca_mj.record.plots import temperature_colour
-from tca_mj.tca import CATALOGUE, Load, LoadedTcas, hanging_length, softening, untwist
+from tca_mj.tca import CATALOGUE, Load, hanging_length, softening, untwist
 from tca_mj.validation import drag, lifting, sensors, strokes, theories
 from tca_mj.validation.creeping import experiment, four_lengths
 from tca_mj.validation.race import race
@@ -25,8 +25,8 @@ _SHADES = {theory.name: shade for theory, shade in zip(
 _HOT = np.linspace(25.0, 180.0, 156)  # [°C]
 _DATA_END = 160.0  # upper end of the measurements behind expansion and softening [°C]
 _SPRING = 10.0  # stiffness of case 2, not published: an estimate [N/m]
-_STYLE = {"lines.linewidth": 2.0, "legend.fontsize": 8, "legend.frameon": False,
-          "axes.titlesize": 10, "axes.spines.top": False}  # fmt: skip
+_STYLE: Any = {"lines.linewidth": 2.0, "legend.fontsize": 8, "legend.frameon": False,
+               "axes.titlesize": 10, "axes.spines.top": False}  # fmt: skip
 _MOVED = {"xlabel": "time [s]", "ylabel": "displacement [mm]"}
 
 

@@ -7,7 +7,8 @@ University.
 """
 
 import math
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -15,12 +16,13 @@ import numpy as np
 from tca_mj import pages
 from tca_mj.smp.convection import moving_air, radiation, still_air
 from tca_mj.tca import CATALOGUE, Heating, Load, LoadedTcas, TcaBank, TcaMelted, TcaSpec
+from tca_mj.tca.dynamics.loads import Course
 from tca_mj.tca.embedding import silicone_body
 from tca_mj.tca.thermal import BodyHeat
 from tca_mj.validation.facts import Finding, check, fitted, trend
 from tca_mj.validation.race import NAMES, run
 from tca_mj.validation.sensors import SENSED, crept
-from tca_mj.validation.strokes import TYPES, heat_up
+from tca_mj.validation.strokes import heat_up
 from tca_mj.validation.theories import crept_free_stroke
 
 THREAD = 0.350  # Sun, Table 2.1 [m]
@@ -31,6 +33,7 @@ FINGER = 6.6  # two TCAs of 45 mm, Sun, Section 4.2.2 [ohm]
 ACCELERATION = 0.2  # of 20 g at 10 and 12 V at most, Sun, Section 2.3.1 [m/s^2]
 PULSES = ((1.5, 0.8), (2.5, 0.3))  # on a TCA of 100 mm, Sun, Section 4.3.4 [A, s]
 _COIL = CATALOGUE["free-stroke"]
+_SENSED_MADE = 0.1335  # made length of the TCA of Table 2.3 [m]
 _MADE = CATALOGUE["free-stroke-made"].rest_length / _COIL.rest_length
 _COMPUTED = 1300.0 * math.pi * 0.21e-3**2  # density of Sun, Table 3.1, on its circle [kg/m]
 _STILL = 23.0 * 2.5 * 2.0 * math.pi  # h c_s 2 pi, Sun, Table 3.1 and Section 3.1.1 [W/(m^2 K)]
@@ -61,19 +64,19 @@ class Candidate(NamedTuple):
         mass = "weighed" if self.weighed else "computed"
         return f"{mass}, {self.loss}, {self.resistance}, {self.slope}"
 
-    def tca(self, tca: TcaSpec, made: float) -> TcaSpec:
-        """A bare TCA under it; ``made`` is its made length [m]."""
+    def tca(self, tca: TcaSpec, made: float, like: TcaSpec | None = None) -> TcaSpec:
+        """A bare TCA under it, of the resistance of one ``like`` it that was made so long [m]."""
+        like = like or tca
         density = tca.fibre.line_density if self.weighed else _COMPUTED
-        natural = tca.rest_length
-        ohms = READINGS[self.resistance](tca.fibre_length, made, natural)
+        ohms = READINGS[self.resistance](like.fibre_length, made, like.rest_length)
         return replace(
             tca, fibre=replace(tca.fibre, line_density=density), heat_loss=LOSSES[self.loss],
-            resistance_per_length=ohms / natural, contraction_resistance=SLOPES[self.slope],
+            resistance_per_length=ohms / tca.rest_length,
+            contraction_resistance=SLOPES[self.slope],
         )  # fmt: skip
 
 
-@dataclass(frozen=True, slots=True)
-class Heated:
+class Heated(NamedTuple):
     """What a candidate gives; None where the fibre would melt.
 
     Attributes:
@@ -119,7 +122,7 @@ class Heated:
 
 def heated(candidate: Candidate) -> Heated:
     """All thermal facts under one candidate."""
-    sensed = candidate.tca(SENSED, 0.1335)
+    sensed = candidate.tca(SENSED, _SENSED_MADE)
     ohms, loss = sensed.resistance_per_length * sensed.rest_length, sensed.heat.loss
     hottest, largest = _race(candidate)
     long = candidate.tca(_COIL.of_length(0.100), 0.100 * _MADE)
@@ -136,40 +139,35 @@ def heated(candidate: Candidate) -> Heated:
     )  # fmt: skip
 
 
+def _melts(specs: Sequence[TcaSpec], heat: Callable[[], Course]) -> Course | None:
+    """What TCAs do; None where one melts."""
+    try:
+        course = heat()
+    except ValueError:  # no modulus is left
+        return None
+    return course if course.temperature.max() < specs[0].fibre.melting_temperature else None
+
+
 def _race(candidate: Candidate) -> tuple[float | None, float | None]:
     # One thread, one resistance (Section 2.2.2): that of the TCA of Table 2.3.
-    ohms = READINGS[candidate.resistance](THREAD, 0.1335, 0.110)
-    specs = [replace(candidate.tca(CATALOGUE[name], 1e-3 * TYPES[name][2]),
-                     resistance_per_length=ohms / CATALOGUE[name].rest_length)
-             for name in NAMES]  # fmt: skip
-    try:
-        course = run(specs, 0.02)
-    except ValueError:  # no modulus is left
-        return None, None
-    if course.temperature.max() > specs[0].fibre.melting_temperature:
+    specs = [candidate.tca(CATALOGUE[name], _SENSED_MADE, SENSED) for name in NAMES]
+    course = _melts(specs, lambda: run(specs, 0.02))
+    if course is None:
         return None, None
     moved = 1e3 * (course.length[0] - course.length[-1])
     return float(course.temperature.max()), float(moved.max())
 
 
 def _lifted(candidate: Candidate, volts: float) -> float | None:
-    natural, made = _COIL.rest_length, _COIL.rest_length * _MADE
-    ohms = READINGS[candidate.resistance](_COIL.fibre_length, made, natural)
-    tca = candidate.tca(crept_free_stroke(30), made)
-    tca = replace(tca, resistance_per_length=ohms / tca.rest_length)
-    try:
-        course = heat_up(LoadedTcas([tca], Load.weight(0.030)), "voltage", volts, 0.02, 200)
-    except ValueError:
-        return None
-    hot = float(course.temperature[-1, 0])
-    return hot if hot < tca.fibre.melting_temperature else None
+    tca = candidate.tca(crept_free_stroke(30), _COIL.rest_length * _MADE, _COIL)
+    tcas = LoadedTcas([tca], Load.weight(0.030))
+    course = _melts([tca], lambda: heat_up(tcas, "voltage", volts, 0.02, 200))
+    return None if course is None else float(course.temperature[-1, 0])
 
 
 def _lift(candidate: Candidate) -> tuple[float, float]:
     """Largest acceleration of 20 g at 12 V up to 40 mm; power that holds it there."""
-    tca = crept(20)
-    ohms = READINGS[candidate.resistance](THREAD, 0.1335, 0.110)
-    tca = replace(candidate.tca(tca, 0.1335), resistance_per_length=ohms / tca.rest_length)
+    tca = candidate.tca(crept(20), _SENSED_MADE, SENSED)
     tcas = LoadedTcas([tca], Load.weight(0.020))
     state, moved, hot, dt = tcas.rest(), [0.0], 25.0, 0.005
     start = float(state.length[0])
@@ -240,9 +238,9 @@ def table() -> str:
         star = r"\*\* " if one == IN_USE else r"\* " if one == DEFAULTS else ""
         rows.append([
             f"{star}{one.words}", f"{row.mass:.0f}", f"{row.current:.0f}", f"{row.warming:.1f}",
-            _hot(row.race), _hot(row.largest), ", ".join(map(_hot, row.volts)),
-            f"{row.acceleration:.2f}", f"{row.hold:.1f}", ", ".join(map(_hot, row.pulses)),
-            ", ".join(map(_hot, row.soft)), f"{row.finger:.1f}", f"{sum(row.held)}",
+            _hot(row.race), _hot(row.largest), _hot(*row.volts), f"{row.acceleration:.2f}",
+            f"{row.hold:.1f}", _hot(*row.pulses), _hot(*row.soft), f"{row.finger:.1f}",
+            f"{sum(row.held)}",
         ])  # fmt: skip
     heads = ["mass, loss, resistance, slope", "mass [mg]", "0.8 V [mA]", "warms [K]",
              "1 A, 2 s [°C]", "moves [mm]", "5, 6 V [°C]", "12 V [m/s²]", "holds 40 mm [W]",
@@ -250,20 +248,19 @@ def table() -> str:
     (cylinder, thread, draught), (hot_cylinder, hot_thread, hot_draught) = (
         [1e3 * taken for taken in bounds(hot).values()] for hot in (27.0, 160.0)
     )
-    return "\n".join([
+    return pages.page(
         "Every thermal fact under every reading. *Mass*: weighed (32 mg per TCA, 117 mg/m), or"
         " computed, 1300 kg/m³ on the circle of 0.21 mm. *Loss*: h c_s = 23 x 2.5 W/(m² K) on"
         " thread of 0.17 or 0.21 mm radius, or 32, 56 and 64 mW/K of 350 mm. *Resistance*: what"
         " 6.7 ohm/dm are counted on, or 10 ohm per 350 mm of thread. *Slope*: how much it rises"
         " over the free stroke. A dash is a fibre that melts. Stars: in use, ** for the TCAs of"
         " Chapter 2, * by default.",
-        "", *pages.table(heads, rows), "",
+        pages.table(heads, rows),
         "Air takes, per metre of thread and kelvin (27 and 160 °C): from the coil's outer cylinder"
         f" {cylinder:.0f} and {hot_cylinder:.0f} mW, from a single thread {thread:.0f} and"
         f" {hot_thread:.0f} mW, in a draught of 0.4 m/s {draught:.0f} and {hot_draught:.0f} mW. By"
         f" default a TCA loses {1e3 * LOSSES['0.21']:.0f} mW, those of Chapter 2"
         f" {1e3 * LOSSES['56 mW/K']:.0f}.",
-        "",
         "No reading holds everything, because Chapters 2 and 4 contradict each other: around 80 mA"
         " need a resistance at which 2.5 A melt a bare TCA, and the finger has less. So each"
         " chapter keeps what was measured in it. TCAs of Chapter 2 have the made length's"
@@ -275,11 +272,11 @@ def table() -> str:
         " computed one slows the start at 12 V, and is twice what the scales say. What 5 and 6 V"
         " did to the free-stroke TCA decides nothing: with the identified loss only the thread's"
         " length survives it, and that contradicts every other resistance.",
-    ])  # fmt: skip
+    )
 
 
-def _hot(value: float | None) -> str:
-    return "-" if value is None else f"{value:.0f}"
+def _hot(*values: float | None) -> str:
+    return ", ".join("-" if value is None else f"{value:.0f}" for value in values)
 
 
 def findings() -> list[Finding]:
@@ -290,8 +287,8 @@ def findings() -> list[Finding]:
     line = 1e6 * _COIL.fibre.line_density
     solid = 1e6 * 1300.0 * math.pi * 0.17e-3**2
     rise = 100.0 * _COIL.contraction_resistance * 0.357
-    both = [value for value in (*default.pulses, *default.soft) if value is not None]
-    melts = len(both) < 2 * len(PULSES)
+    hottest = max(math.inf if value is None else value
+                  for value in (*default.pulses, *default.soft))  # fmt: skip
     return [
         check("Section 2.1.1", "mass of a TCA of Chapter 2, from its thread",
               "0.03 g, five 0.16 g", named, 28.8, 35.2, "mg",
@@ -320,11 +317,9 @@ def findings() -> list[Finding]:
               " 12 mm on it is below 0.2. The mass that density and circle give, twice the weighed"
               " one, would hold it."),
         check("Section 4.3.4", "100 mm, 1.5 A for 0.8 s and 2.5 A for 0.3 s: hottest",
-              "it is not damaged", math.inf if melts else max(both), -math.inf,
-              _COIL.fibre.melting_temperature, "°C", digits=0,
-              note="Bare, which is the worst case, with the default loss and 6.7 ohm; the band is"
-              " the melting point. In silicone "
-              + ", ".join(map(_hot, default.soft)) + " °C."),
+              "it is not damaged", hottest, -math.inf, _COIL.fibre.melting_temperature, "°C",
+              digits=0, note="Bare, which is the worst case, with the default loss and 6.7 ohm; the"
+              f" band is the melting point. In silicone {_hot(*default.soft)} °C."),
         check("Section 4.2.2", "resistance of a finger's two TCAs of 45 mm", "6.6 ohm",
               default.finger, 0.9 * FINGER, 1.1 * FINGER, "ohm",
               note="By the natural length, which all TCAs but those of Chapter 2 have; leads are"

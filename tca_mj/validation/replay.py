@@ -10,6 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from itertools import groupby
 from types import MappingProxyType
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
@@ -31,8 +32,7 @@ LONGEST = 30.0  # of the bend, an estimate [s]
 _STILL = 0.3  # change of the bend within 2 s that counts as none [deg]
 
 
-@dataclass(frozen=True, slots=True)
-class Powers:
+class Powers(NamedTuple):
     """The printed powers of one object.
 
     Attributes:

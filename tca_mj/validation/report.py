@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import asdict
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -22,14 +23,25 @@ from tca_mj.validation import (
 )
 from tca_mj.validation.facts import Finding, reasons, table, tally
 
-# Heading, and figures with their captions, in the order of the report.
-_CHAPTERS = {
-    "Strokes (Chapter 2)": ("strokes", "creep", "drag"),
-    "Heat and resistance": (),
-    "Sensing and control (Chapter 2)": ("sensing", "control"),
-    "Models (Chapter 3)": ("fibre", "statics", "spring", "dynamics", "cone"),
-    "Modules and arm (Chapter 4)": (),
-}
+# Heading, what finds its facts, and its figures, in the order of the report.
+_CHAPTERS: dict[str, tuple[tuple[Callable[[], list[Finding]], ...], tuple[str, ...]]] = {
+    "Strokes (Chapter 2)": (
+        (strokes.free_strokes, strokes.contact_stops,
+         partial(strokes.loaded_contractions, scanned=True),
+         strokes.loaded_stroke, drag.findings, strokes.overlap, race.fastest, creeping.findings),
+        ("strokes", "creep", "drag"),
+    ),
+    "Heat and resistance": ((heat.findings,), ()),
+    "Sensing and control (Chapter 2)": (
+        (sensors.findings, lifting.steps, lifting.demonstration, lifting.finger),
+        ("sensing", "control"),
+    ),
+    "Models (Chapter 3)": (
+        (theories.moduli, theories.spread, theories.dynamics, theories.conical, theories.speed),
+        ("fibre", "statics", "spring", "dynamics", "cone"),
+    ),
+    "Modules and arm (Chapter 4)": ((modules.findings,), ()),
+}  # fmt: skip
 # Width and height [inches], what draws it, and its caption.
 _FIGURES: dict[str, tuple[float, float, Callable[[Any], None], str]] = {
     "strokes": (9.5, 7.4, figures.strokes_figure,
@@ -64,18 +76,8 @@ _FIGURES: dict[str, tuple[float, float, Callable[[Any], None], str]] = {
 
 def all_findings() -> dict[str, list[Finding]]:
     """Every finding, by chapter of the report."""
-    scans = strokes.scan_of_choices(), strokes.scan_of_factors()
-    chapters = [
-        [*strokes.free_strokes(), *strokes.contact_stops(), *strokes.loaded_contractions(*scans),
-         *strokes.loaded_stroke(), *drag.findings(), *strokes.overlap(), *race.fastest(),
-         *creeping.findings()],
-        heat.findings(),
-        [*sensors.findings(), *lifting.steps(), *lifting.demonstration(), *lifting.finger()],
-        [*theories.moduli(), *theories.spread(), *theories.dynamics(), *theories.conical(),
-         *theories.speed()],
-        modules.findings(),
-    ]  # fmt: skip
-    return dict(zip(_CHAPTERS, chapters, strict=True))
+    return {name: [row for find in finders for row in find()]
+            for name, (finders, _) in _CHAPTERS.items()}  # fmt: skip
 
 
 def all_tables() -> dict[str, str]:
@@ -110,7 +112,7 @@ def validate_tca(out: Path | None = None) -> dict[str, Any]:
     if out is not None:
         out.mkdir(parents=True, exist_ok=True)
         draw_figures(out)
-        pages.write_result(out, "report", result, report(result, ""))
+    pages.write_result(out, "report", result, report(result, ""))
     return result
 
 
@@ -129,12 +131,10 @@ def report(result: dict[str, Any], pictures: str | None = None) -> str:
             if it is another one; None for no figures.
     """
     counts = ", ".join(f"{number} {verdict}" for verdict, number in result["tally"].items())
-    lines = [*pages.made_with(result), "", f"{sum(result['tally'].values())} facts: {counts}.", ""]
+    blocks = [pages.made_with(result), f"{sum(result['tally'].values())} facts: {counts}."]
     for name, rows in result["chapters"].items():
         found = [Finding(**row) for row in rows]
-        lines += [f"## {name}", "", table(found), "", reasons(found), ""]
-        if name in result["tables"]:
-            lines += [result["tables"][name], ""]
-        for figure in _CHAPTERS[name] if pictures is not None else ():
-            lines += pages.picture(_FIGURES[figure][3], f"{pictures}validation_{figure}.png")
-    return "\n".join(lines).rstrip()
+        blocks += [f"## {name}", table(found), reasons(found), result["tables"].get(name, "")]
+        blocks += [pages.picture(_FIGURES[figure][3], f"{pictures}validation_{figure}.png")
+                   for figure in _CHAPTERS[name][1] if pictures is not None]  # fmt: skip
+    return pages.page(*blocks)

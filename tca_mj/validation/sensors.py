@@ -1,12 +1,12 @@
 """Resistance over length, displacement and force, and the cubic read from it (Sun, 2.3)."""
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
 
 from tca_mj.checks import Array
-from tca_mj.tca import Load, LoadedTcas, TcaSpec, WireTable, hanging_length, resistance
-from tca_mj.tca.catalogue import MODULE_TCAS
+from tca_mj.tca import MODULE_TCAS, Load, LoadedTcas, TcaSpec, WireTable, hanging_length, resistance
 from tca_mj.tca.sensing.sensor import measured
 from tca_mj.tca.sensing.wire import DisplacementFit, fit_displacement, resistance_displacement
 from tca_mj.validation.facts import Finding, check, fitted, trend
@@ -16,6 +16,7 @@ SENSED = MODULE_TCAS["sensing"]
 WIRE = WireTable.of([SENSED])
 WEIGHTS = (10, 20, 30, 40, 50)  # Sun, Section 2.3.1 [g]
 VOLTS = (12.0, 10.0)  # Sun, Section 2.3.1
+Ohms = Callable[[Array, Array], Array]  # of length [m] and temperature [°C]
 _RUNS = 20  # measurements over which an error is averaged
 _LOOK = "Section 2.3.1"
 
@@ -33,15 +34,20 @@ class Curve(NamedTuple):
     ohms: Array
 
 
-def lifted(grams: float, volts: float, duration: float = 2.0) -> Curve:
-    """Resistance while a voltage lifts a weight by up to 45 mm, from the crept, loaded length."""
-    tca = crept(grams)
-    start = float(LoadedTcas([tca], Load.weight(1e-3 * grams)).rest().length[0])
+def under(tca: TcaSpec, grams: float) -> tuple[LoadedTcas, Ohms, float]:
+    """A TCA with a weight: both, its resistance, and its length at rest [m]."""
+    load = Load.weight(1e-3 * grams)
+    start = float(LoadedTcas([tca], load).rest().length[0])
 
     def ohms(length: Array, temperature: Array) -> Array:
         return resistance_displacement(WIRE, start - length, weight(grams), temperature)
 
-    tcas = LoadedTcas([tca], Load.weight(1e-3 * grams), resistance=ohms)
+    return LoadedTcas([tca], load, resistance=ohms), ohms, start
+
+
+def lifted(grams: float, volts: float, duration: float) -> Curve:
+    """Resistance while a voltage lifts a weight by up to 45 mm, from the crept, loaded length."""
+    tcas, ohms, start = under(crept(grams), grams)
     course = heat_up(tcas, "voltage", volts, 0.01, round(100 * duration))
     moved = start - course.length[:, 0]
     kept = moved <= 0.045
@@ -65,8 +71,9 @@ def cubic(curve: Curve, seed: int) -> tuple[DisplacementFit, Array]:
     return fit_displacement(ohms, curve.displacement), ohms
 
 
-def characterisation(found: dict[int, Curve]) -> list[Finding]:
-    """Facts about the ``curves()``."""
+def findings() -> list[Finding]:
+    """Facts about the ``curves()``, and the error of the third-order polynomial D(R) of them."""
+    found = curves()
     ohms = resistance(WIRE, SENSED.rest_length + np.array([[0.0], [0.055]]), 25.0)[:, 0]
     falls = stretched(weight(1.0) * np.linspace(0.0, 50.0, 26))
     rising = all(bool(np.all(np.diff(curve.ohms) > 0.0)) for curve in found.values())
@@ -74,6 +81,10 @@ def characterisation(found: dict[int, Curve]) -> list[Finding]:
     at = np.array([np.interp(0.02, curve.displacement, curve.ohms) for curve in both])
     slope = float(WIRE.contraction[0] * WIRE.rest_resistance[0] / WIRE.rest_length[0])
     off = 1e3 * float(np.abs(at - at[: len(found)].mean()).max()) / slope
+    light, heavy = (
+        1e3 * float(np.mean([cubic(found[grams], seed)[0].rmse for seed in range(_RUNS)]))
+        for grams in (20, 40)
+    )
     return [
         fitted(_LOOK, "cold, pulled by 50 %", "0.55 ohm", f"{ohms[0] - ohms[1]:.2f} ohm",
                "`TcaSpec.stretch_resistance`.", value=float(ohms[0] - ohms[1])),
@@ -89,16 +100,6 @@ def characterisation(found: dict[int, Curve]) -> list[Finding]:
               note="At 20 mm. What a load stretches elastically lowers the resistance as it does"
               " when cold; what has crept does not count. Nothing is fitted, and the law has no"
               " term of speed."),
-    ]  # fmt: skip
-
-
-def polynomial(found: dict[int, Curve]) -> list[Finding]:
-    """Error of the third-order polynomial D(R) of the ``curves()``."""
-    light, heavy = (
-        1e3 * float(np.mean([cubic(found[grams], seed)[0].rmse for seed in range(_RUNS)]))
-        for grams in (20, 40)
-    )
-    return [
         fitted("Section 2.3.2", "error of the cubic D(R), 20 g", "0.22 mm", f"{light:.2f} mm",
                "`CurrentSensor.noise`.", value=light),
         check("Section 2.3.2", "error of the cubic D(R), 40 g", "0.35 mm", heavy, 0.30, 0.40, "mm",
@@ -107,9 +108,3 @@ def polynomial(found: dict[int, Curve]) -> list[Finding]:
               " 20 g: the law is a straight line, which the cubic follows exactly. What makes 40 g"
               " worse is not reported; 1.6 times the noise would do."),
     ]  # fmt: skip
-
-
-def findings() -> list[Finding]:
-    """All of this file."""
-    found = curves()
-    return [*characterisation(found), *polynomial(found)]

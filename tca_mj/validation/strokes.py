@@ -4,7 +4,7 @@
 """
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import product
 from typing import Literal, NamedTuple, get_args
 
@@ -199,30 +199,26 @@ _LOADED = CATALOGUE["free-stroke"].fibre.load_softening
 _RADII = (THICKNESS / 2.0, FibreSpec().radius)  # Tables 2.1 and 3.1
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Scan:
-    """Sets that were tried for the contractions, the best first.
+class Scan(NamedTuple):
+    """Sets that were tried for the contractions, the best first, those without a modulus last.
 
     Attributes:
         choices: The sets.
         values: Their contractions in the order of ``CONTRACTIONS``, shape (k, 4) [mm].
         errors: Largest difference from what is printed, shape (k,) [mm].
-        impossible: Number of sets that leave no modulus.
     """
 
     choices: tuple[Choice, ...]
     values: Array
     errors: Array
-    impossible: int
 
     @classmethod
     def of(cls, choices: list[Choice]) -> "Scan":
         """Computes the contractions of all sets."""
         values = np.array([choice.contractions() for choice in choices])
         errors = np.abs(values - np.array(list(CONTRACTIONS.values()))).max(axis=1)
-        order = [int(i) for i in np.argsort(errors) if np.isfinite(errors[i])]
-        return cls(tuple(choices[i] for i in order), values[order], errors[order],
-                   len(choices) - len(order))  # fmt: skip
+        order = np.argsort(errors)
+        return cls(tuple(choices[i] for i in order), values[order], errors[order])
 
 
 def scan_of_choices() -> Scan:
@@ -241,14 +237,11 @@ def scan_of_factors() -> Scan:
     ])  # fmt: skip
 
 
-def loaded_contractions(scan: Scan | None = None, factors: Scan | None = None) -> list[Finding]:
-    """Contractions under 40 g, and what a scan of everything that is open gives for them.
-
-    Args:
-        scan: ``scan_of_choices()``; None to say nothing of it.
-        factors: ``scan_of_factors()``; None to say nothing of it.
-    """
-    between = _stroke_difference()
+def loaded_contractions(*, scanned: bool = False) -> list[Finding]:
+    """Contractions under 40 g, and what scans of everything that is open give, if ``scanned``."""
+    none, one = (hanging_length(tca, 25.0, weight(40)) - tca.rest_length
+                 for tca in (CATALOGUE[name] for name in STOPS))  # fmt: skip
+    between = 1e3 * float(one - none)  # cold stretch of type 1 less that of type 0 [mm]
     reason = (
         "The two types differ by 20 mm in print. In the model type 1 stretches"
         f" {-between:.1f} mm less than type 0 under 40 g when cold, and its free stroke is 14.5 mm"
@@ -256,38 +249,27 @@ def loaded_contractions(scan: Scan | None = None, factors: Scan | None = None) -
         " no more than 14.5 mm however stiff the thread; with neither touching by a few mm, at"
         " first the other way round. No choice of thread holds both (the table of threads)."
     )
-    if scan is not None and factors is not None:
-        reason += " " + _said(scan, factors)
-    printed = {name: CONTRACTIONS[name, 40] for name in STOPS}
+    if scanned:
+        reason += f" {_scans()}"
     return [
         check("Section 2.2.1", f"{name}, 40 g, to 150 °C", f"{mm:g} mm",
               contraction(CATALOGUE[name], 40, 150.0), mm - DEVIATION, mm + DEVIATION, "mm",
               reason=reason)
-        for name, mm in printed.items()
+        for name, mm in ((name, CONTRACTIONS[name, 40]) for name in STOPS)
     ]  # fmt: skip
 
 
-def _stroke_difference() -> float:
-    """Cold stretch of type 1-180 under 40 g less that of type 0-180 [mm]."""
-    one, none = (
-        1e3 * float(hanging_length(CATALOGUE[name], 25.0, weight(40)) - CATALOGUE[name].rest_length)
-        for name in ("type-1-180", "type-0-180")
-    )
-    return one - none
-
-
-def _said(scan: Scan, factors: Scan) -> str:
-    def numbers(values: Array) -> str:
-        return " / ".join(f"{value:.1f}" for value in values)
-
-    total = len(scan.choices) + scan.impossible
-    fits = len(factors.choices) + factors.impossible
+def _scans() -> str:
+    """The best of both scans, in words."""
+    scan, factors = scan_of_choices(), scan_of_factors()
+    best, fitted_best = (" / ".join(f"{mm:.1f}" for mm in each.values[0])
+                         for each in (scan, factors))  # fmt: skip
     return (
-        f"Of {total} sets of what the source leaves open the best,"
-        f" {scan.choices[0].words}, gives {numbers(scan.values[0])} mm for the printed"
+        f"Of {len(scan.choices)} sets of what the source leaves open the best,"
+        f" {scan.choices[0].words}, gives {best} mm for the printed"
         f" 4 / 20 / 24 / 44 mm, off by up to {scan.errors[0]:.1f} mm. With untwist and moduli"
-        f" scaled at will ({fits} sets) the best, {factors.choices[0].words}, gives"
-        f" {numbers(factors.values[0])} mm: all four at the contact stop, and still off by"
+        f" scaled at will ({len(factors.choices)} sets) the best, {factors.choices[0].words}, gives"
+        f" {fitted_best} mm: all four at the contact stop, and still off by"
         f" {factors.errors[0]:.1f} mm, more than the standard deviation of {DEVIATION} mm."
     )
 
@@ -313,7 +295,6 @@ def loaded_stroke() -> list[Finding]:
             f" coils touch at {meets:.0f} °C ({touching:.0f} %), without load, which is the free"
             f" stroke of 48 %, at {bare:.0f} °C. Both are beyond the data: at 160 °C it is"
             f" {100.0 * float(1.0 - data / cold):.0f} %.",
-            reason="The fibre does not untwist enough.",
         ),
         fitted("Section 2.1.1", "force at which type-2-200 breaks", "0.78 N",
                f"{tca.breaking_force:.2f} N",
@@ -336,7 +317,6 @@ def overlap() -> list[Finding]:
     return [
         trend("Section 2.2.1", f"{name}, 0, 20 and 40 g below 70 °C", "curves almost overlap",
               f"each within {DEVIATION} mm of their mean", f"{early:.1f} mm ({late:.1f} at 150 °C)",
-              early <= DEVIATION, value=early,
-              reason="Without load the coils touch before 70 °C.")
+              early <= DEVIATION, value=early)
         for name, (early, late) in found.items()
     ]  # fmt: skip

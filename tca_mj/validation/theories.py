@@ -115,7 +115,7 @@ def spread() -> list[Finding]:
                             for key, values in heavy.items())
                   + f" % from {TEMPERATURES[middle + 1]:.0f} to 160 °C",
                   all(np.all(np.diff(values[1:]) > 0.0) for values in heavy.values()),
-                  strict=True, reason="See the growth with load."),
+                  strict=True),
         ]  # fmt: skip
     made = {theory.name: distances(CATALOGUE["free-stroke-made"], 60, theory)[-1]
             for theory in (CST, PATH, LOVE)}  # fmt: skip
@@ -162,8 +162,7 @@ def lifting(
     return LoadedTcas([tca], load or Load.weight(1e-3 * grams), law=law)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Lift:
+class Lift(NamedTuple):
     """One case of Section 3.4.4, case 3, in three models; shapes (k,).
 
     Attributes:

@@ -91,15 +91,15 @@ def table() -> str:
     heads = ["thread", "0 g, types 0, 1 [mm]", "40 g [mm]", "55 % under 10 g [%]",
              "0.4 N, start and end [N]", "below 70 °C [mm]", "l4 - l2 [mm]", "1 A, 2 s [mm]",
              "held of 11", "fitted"]  # fmt: skip
-    return "\n".join([
+    return pages.page(
         "Chapters 2 and 3 twist the same thread under the same weight. One thread has the EA, EI"
         " and GJ that were measured in Chapter 3, two threads take its moduli on the thickness of"
         " 0.34 mm. Strokes and pull are those of type 2-200 (10 g, to 160 and 200 °C; at the"
         " natural length at 160 °C and at the end of the free stroke at 200 °C), the temporary"
         " length is by how much l4 exceeds l2 with ends free to spin. The loss to air is that in"
         " use, which was fitted with one thread.",
-        "", *pages.table(heads, rows), "",
+        pages.table(heads, rows),
         "One thread holds more than two, with nothing fitted. A larger untwist (1.6 times, as the"
         " self-coiled TCA has it) would hold the drag over the whole stroke and loses as much"
         " elsewhere, so that it stays at 1.",
-    ])  # fmt: skip
+    )

@@ -62,14 +62,12 @@ class Mesh:
     def points(self, segment: int) -> Array:
         """The points of a segment, from 0 to 1, shape (pieces, q)."""
         edge = self.edges[segment]
-        points: Array = edge[:-1, None] + np.diff(edge)[:, None] * self.rule.node
-        return points
+        return edge[:-1, None] + np.diff(edge)[:, None] * self.rule.node
 
     def tail(self, values: Array) -> Array:
         """Largest of the last Legendre coefficients of each piece, (n, q, m) -> (n,)."""
         coefficients = np.einsum("kq,nqi->nki", self.rule.transform[-2:], values)
-        tail: Array = np.abs(coefficients).max(axis=(1, 2))
-        return tail
+        return np.abs(coefficients).max(axis=(1, 2))
 
     def halved(self, rough: NDArray[np.bool_]) -> "Mesh":
         """The mesh with chosen pieces halved.
@@ -89,8 +87,7 @@ class Mesh:
     def at(self, values: Array, segment: int, s: Array) -> Array:
         """Values at points of a segment from those at the mesh's, (n, q, m) -> (..., m)."""
         piece, place = self.inside(segment, s)
-        found: Array = np.einsum("...q,...qi->...i", lagrange(self.rule.node, place), values[piece])
-        return found
+        return np.einsum("...q,...qi->...i", lagrange(self.rule.node, place), values[piece])
 
     def carried(self, values: Array, finer: "Mesh") -> Array:
         """The values at the points of another mesh."""

@@ -165,23 +165,12 @@ class Potential:
         excess = strain - self.unloaded
         stress = self._stiffness * excess
         return State(
-            strain=strain,
-            factor=factor,
-            pieces=pieces,
-            before=before,
-            after=after,
-            tip=tip,
-            pull=pull,
-            elastic=0.5 * float(np.sum(self._weight[..., None] * stress * excess)),
-            work=float(np.sum(load * tip)),
-            length=length,
-            tension=tension,
-            stiffness=stiffness,
-            drawn=drawn,
-            slope=stress + np.tensordot(tension, drawn, 1),
-            bend=bend,
+            strain=strain, factor=factor, pieces=pieces, before=before, after=after, tip=tip,
+            pull=pull, elastic=0.5 * float(np.sum(self._weight[..., None] * stress * excess)),
+            work=float(np.sum(load * tip)), length=length, tension=tension, stiffness=stiffness,
+            drawn=drawn, slope=stress + np.tensordot(tension, drawn, 1), bend=bend,
             shortest=float(density[sections.strand < count].min(initial=1.0)),
-        )
+        )  # fmt: skip
 
     def change(self, old: State, new: State) -> float:
         """Energy of a state minus that of another one nearby, with a moment's work on the way.
@@ -199,8 +188,7 @@ class Potential:
         """Derivative of the energy by the strains, shape (n, q, m)."""
         ring = self._ring(state)[:, range(POINTS), range(POINTS)]
         work = np.einsum("nqij,aji->nqa", ring, self._basis)
-        gradient: Array = self._weight[..., None] * state.slope - work
-        return gradient
+        return self._weight[..., None] * state.slope - work
 
     def _ring(self, state: State) -> Array:
         """T_q P^T S_r with P the derivative of the work by a piece's motion, (n, q, r, 5, 5)."""
@@ -266,15 +254,12 @@ class Potential:
             own = slice(strand, strand + len(segment.routes))
             strand = own.stop
             beyond = (state.tip[:3, 4] - frame[0, :3, 4]) * self._force * self._size
-            shapes.append(
-                RodShape(
-                    position=self._size * frame[:, :3, 3],
-                    rotation=frame[:, :3, :3].copy(),
-                    arc_length=segment.beam.length * s,
-                    strain=strain,
-                    tca_length=self._size * state.length[own],
-                    base_force=0.0 - force - masses[index:].sum() * gravity,
-                    base_moment=0.0 - moment - np.cross(beyond, gravity),
-                )
-            )
+            shape = RodShape(
+                position=self._size * frame[:, :3, 3], rotation=frame[:, :3, :3].copy(),
+                arc_length=segment.beam.length * s, strain=strain,
+                tca_length=self._size * state.length[own],
+                base_force=0.0 - force - masses[index:].sum() * gravity,
+                base_moment=0.0 - moment - np.cross(beyond, gravity),
+            )  # fmt: skip
+            shapes.append(shape)
         return tuple(shapes)

@@ -160,8 +160,7 @@ def _solved_upright(matrix: Array, right: Array) -> Array | None:
     swaps = np.count_nonzero(pivots != np.arange(len(pivots)))
     if np.prod(np.sign(np.diag(factors))) * (-1) ** swaps <= 0.0:
         return None
-    solution: Array = dgetrs(factors, pivots, right)[0]
-    return solution
+    return dgetrs(factors, pivots, right)[0]
 
 
 def _escape(potential: Potential, state: State) -> Array:

@@ -114,15 +114,11 @@ class Steps:
         strain_by_tension = -compliance @ pull
         shape = (len(self.length), STAGES)
         return Evaluation(
-            slope=slope.reshape(*shape, 7),
-            by_state=by_state.reshape(*shape, 7, 7),
-            by_tension=(by_strain @ strain_by_tension).reshape(*shape, 7, len(varied)),
-            strain=xi,
-            strain_by_state=strain_by_state,
-            strain_by_tension=strain_by_tension,
-            pull=pull,
+            slope=slope.reshape(*shape, 7), by_state=by_state.reshape(*shape, 7, 7),
+            by_tension=(by_strain @ strain_by_tension).reshape(*shape, 7, len(varied)), strain=xi,
+            strain_by_state=strain_by_state, strain_by_tension=strain_by_tension, pull=pull,
             density=density,
-        )
+        )  # fmt: skip
 
     def defect(self, start: Array, stages: Array, at: Evaluation) -> tuple[Array, Array]:
         """Residual of the stages, shape (I, STAGES, 7), and ends of the steps, shape (I, 7)."""

@@ -48,11 +48,9 @@ class State:
     def moved(self, nodes: Array, stages: Array, tension: Array) -> "State":
         """The state after a change; strands do not push."""
         return State(
-            nodes=self.nodes + nodes,
-            stages=self.stages + stages,
-            strain=self.strain,
+            nodes=self.nodes + nodes, stages=self.stages + stages, strain=self.strain,
             tension=np.maximum(self.tension + tension, 0.0),
-        )
+        )  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -24,7 +24,7 @@ from tca_mj.rod.shooting.collocation import STAGES, half_product, in_section
 from tca_mj.rod.shooting.equations import Look, Mesh, State, drag
 from tca_mj.rod.shooting.refinement import differences, refined, sample
 from tca_mj.rod.shooting.series import Series
-from tca_mj.rod.solving import load_up, nudge
+from tca_mj.rod.solving import load_up, nudge, with_finer_meshes
 
 _Found = tuple[State, Look]
 
@@ -38,7 +38,6 @@ _NEAR = 1e-4  # residual at which it may be a neutral mode that keeps Newton's m
 _HOLD = 1e-5  # drag that holds it, in units of moment per turn
 _SOFT = 1e5  # compliance of a mode that counts as neutral, in turn per unit of moment
 _FINEST = 2000  # steps of the last mesh
-_ATTEMPTS = 3  # meshes on which the path is tried, each twice as fine as the one before
 _SPREAD = 0.01  # steps are halved that change by more than this share of the largest change
 _CHANGE = 2e-8  # allowed change by the last refinement; 1/256 of it is left
 
@@ -61,14 +60,12 @@ def solve(problem: StaticProblem, points: int) -> tuple[RodShape, ...]:
 
 def _converged(series: Series) -> tuple[Mesh, State, Look]:
     """The state under the whole load, on a mesh that is fine enough."""
-    for attempt in range(_ATTEMPTS):
-        mesh = Mesh(series, series.first_mesh(2**attempt))
-        try:
-            state, look = _follow(mesh)
-            break
-        except RodSolveError:
-            if attempt == _ATTEMPTS - 1:
-                raise
+
+    def start(finer: int) -> tuple[Mesh, _Found]:
+        mesh = Mesh(series, series.first_mesh(finer))
+        return mesh, _follow(mesh)
+
+    mesh, (state, look) = with_finer_meshes(start)
     marked, previous = np.ones(len(mesh.starts), dtype=bool), math.inf
     while True:
         finer, guess, parent, first = refined(mesh, state, marked)
@@ -223,16 +220,12 @@ def _shapes(mesh: Mesh, state: State, look: Look, points: int) -> list[RodShape]
         )
         hold = 0.0 - series.base[k]
         moment = 0.0 - series.moment * rotation[mine][0] @ end[mine][0, 4:]
-        shapes.append(
-            RodShape(
-                position=base + nodes[within[k]] + walked[mine],
-                rotation=rotation[mine],
-                arc_length=segment.beam.length * at,
-                strain=strain,
-                tca_length=lengths[series.first[k] : series.first[k + 1]],
-                base_force=hold,
-                base_moment=moment + np.cross(base, hold),
-            )
-        )
-        base, frame = shapes[-1].position[-1], rotation[mine][-1]
+        shape = RodShape(
+            position=base + nodes[within[k]] + walked[mine], rotation=rotation[mine],
+            arc_length=segment.beam.length * at, strain=strain, base_force=hold,
+            tca_length=lengths[series.first[k] : series.first[k + 1]],
+            base_moment=moment + np.cross(base, hold),
+        )  # fmt: skip
+        shapes.append(shape)
+        base, frame = shape.position[-1], rotation[mine][-1]
     return shapes

@@ -11,6 +11,7 @@ import numpy as np
 from scipy.linalg import solve_banded
 
 from tca_mj.checks import Array
+from tca_mj.rod.solving import band_matrix
 from tca_mj.tca.dynamics.loads import Course, Heating, LoadState
 from tca_mj.tca.dynamics.stepping import LoadedTcas
 
@@ -138,14 +139,12 @@ def _chained(matrix: Array, right: Array) -> Array:
     factor = matrix.reshape(2, unknowns, unknowns, k, -1).swapaxes(3, 4).copy()
     factor[1, ..., 0] = 0.0  # nothing before the first block
     factor = factor.reshape(2, unknowns, unknowns, -1)
-    upper = unknowns - 1
-    band = np.zeros((3 * unknowns - 1, side.size // unknowns, unknowns))
-    for column, row in np.ndindex(unknowns, unknowns):  # band[upper + row - column, column]
-        band[upper + row - column, :, column] = factor[0, column, row]
-        band[upper + unknowns + row - column, :-1, column] = factor[1, column, row, 1:]
-    solution = solve_banded(
-        (2 * unknowns - 1, upper), band.reshape(len(band), -1), side.ravel(),
-        overwrite_ab=True, check_finite=False,
-    )  # fmt: skip
+    first, bands = np.arange(0, side.size, unknowns), (2 * unknowns - 1, unknowns - 1)
+    entries = (
+        (first[late:] + row, first[: first.size - late] + column, factor[late, column, row, late:])
+        for late, column, row in np.ndindex(2, unknowns, unknowns)
+    )
+    band = band_matrix(bands, side.size, entries)
+    solution = solve_banded(bands, band, side.ravel(), overwrite_ab=True, check_finite=False)
     solved = np.moveaxis(solution.reshape(side.shape), (2, 1, 0), (0, 1, 2))
     return np.ascontiguousarray(solved).reshape(right.shape)

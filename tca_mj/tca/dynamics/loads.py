@@ -1,13 +1,13 @@
 """What hangs at TCAs, what heats them, and the states of their motion."""
 
 import math
-from dataclasses import dataclass, fields
-from typing import Literal, get_args
+from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tca_mj.checks import Array, floats, within
+from tca_mj.checks import Array, Checked, NotNegatives, Positives, floats, within
 
 Source = Literal["power", "voltage", "current"]
 
@@ -15,7 +15,7 @@ GRAVITY = 9.81  # [m/s^2]
 
 
 @dataclass(frozen=True, kw_only=True, slots=True, eq=False)
-class Load:
+class Load(Checked):
     """What hangs at TCAs, scalars or arrays that broadcast with (..., n).
 
     Attributes:
@@ -26,15 +26,11 @@ class Load:
         damping: Force per speed of the end, of the TCA and what it moves, not negative [N s/m].
     """
 
-    force: float | Array
-    stiffness: float | Array = 0.0
-    reference: float | Array = 0.0
-    mass: float | Array = 0.0
-    damping: float | Array = 0.0
-
-    def __post_init__(self) -> None:
-        for field in fields(self):
-            within(field.name, getattr(self, field.name), at_least=0.0)
+    force: NotNegatives
+    stiffness: NotNegatives = 0.0
+    reference: NotNegatives = 0.0
+    mass: NotNegatives = 0.0
+    damping: NotNegatives = 0.0
 
     @classmethod
     def weight(cls, mass: float | Array, damping: float | Array = 0.0) -> "Load":
@@ -66,7 +62,7 @@ class Load:
 
 
 @dataclass(frozen=True, kw_only=True, slots=True, eq=False)
-class Heating:
+class Heating(Checked):
     """What heats and cools TCAs during a step, scalars or arrays that broadcast with (..., n).
 
     Attributes:
@@ -77,13 +73,11 @@ class Heating:
 
     source: Source = "power"
     value: float | Array = 0.0
-    air: float | Array = 1.0
+    air: Positives = 1.0
 
     def __post_init__(self) -> None:
-        if self.source not in get_args(Source):
-            raise ValueError(f"source must be one of {get_args(Source)}, got {self.source!r}")
+        Checked.__post_init__(self)
         within("value", self.value, at_least=0.0 if self.source == "power" else -math.inf)
-        within("air", self.air, above=0.0)
 
     def power(self, resistance: ArrayLike) -> Array:
         """Joule heat in given resistances, the broadcast shape [W]."""

@@ -26,7 +26,7 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tca_mj.checks import Array, floats, require_positive, within
+from tca_mj.checks import Array, floats, require_one_of, require_positive, within
 from tca_mj.tca.arrays import stacked
 from tca_mj.tca.dynamics.loads import Course, Heating, Load, LoadState
 from tca_mj.tca.laws.rod import CoilRods, require_domain
@@ -34,7 +34,7 @@ from tca_mj.tca.sensing import wire
 from tca_mj.tca.spec import TcaSpec, heat_of
 from tca_mj.tca.thermal import require_bare
 
-TensionLaw = Callable[[Array, Array], tuple[Array, Array]]
+LengthLaw = Callable[[Array, Array], tuple[Array, Array]]
 """(length, temperature), each (..., n) -> (tension, not clipped, and its slope over length)."""
 ResistanceLaw = Callable[[Array, Array], Array]
 """(length, temperature), each (..., n) -> resistance [ohm]."""
@@ -84,7 +84,7 @@ class LoadedTcas:
         specs: Sequence[TcaSpec],
         load: Load,
         *,
-        law: TensionLaw | None = None,
+        law: LengthLaw | None = None,
         resistance: ResistanceLaw | None = None,
     ) -> None:
         """Gathers the constants.
@@ -105,7 +105,7 @@ class LoadedTcas:
         rods = CoilRods(self.specs)
         self.n = rods.n
         self.shortest, self.longest = rods.shortest, rods.longest
-        self._law: TensionLaw = rods.tension if law is None else law
+        self._law: LengthLaw = rods.tension if law is None else law
         self._resistance = resistance or partial(wire.resistance, wire.WireTable.of(self.specs))
         self.heat = heat_of(self.specs)
         require_bare(self.heat)
@@ -173,8 +173,7 @@ class LoadedTcas:
         require_positive(dt=dt)
         if motion == "quasistatic":
             return self._creep_along(state, heating, dt)
-        if motion != "dynamic":
-            raise ValueError(f"motion must be one of {get_args(Motion)}, got {motion!r}")
+        require_one_of("motion", motion, get_args(Motion))
         load, half = self.load, 0.5 * dt
         mass = within("mass in dynamic motion", load.mass, above=0.0, unit="kg")
         guess = state.length + half * state.velocity
@@ -247,11 +246,8 @@ class LoadedTcas:
             middle = state.temperature + half * (settled - state.temperature)
             power = heating.power(self._resistance(length, middle))
         rise = heat.ambient + power / loss - state.temperature
-        return (
-            power,
-            state.temperature + half * rise,
-            state.temperature + (half * (2.0 - half)) * rise,
-        )
+        middle = state.temperature + half * rise
+        return power, middle, state.temperature + (half * (2.0 - half)) * rise
 
     def pull(self, length: Array, temperature: Array, slack: bool) -> tuple[Array, Array]:
         """Tension and slope; beyond the law's domain, where trial lengths may fall, its tangent."""
@@ -264,37 +260,27 @@ class LoadedTcas:
         return tension, slope
 
     def _balance(
-        self,
-        length: Array,
-        temperature: Array,
-        inert: float | Array,
-        goal: float | Array,
-        accepted: float,
-        *,
-        slack: bool,
-    ) -> Array:
+        self, length: Array, temperature: Array, inert: float | Array, goal: float | Array,
+        accepted: float, *, slack: bool,
+    ) -> Array:  # fmt: skip
         """Solves (inert + load stiffness) l + F(l) = goal by Newton's method from ``length``."""
         fixed = inert + np.asarray(self.load.stiffness, dtype=np.float64)
+        pull = partial(self.pull, temperature=temperature, slack=slack)
         done = np.zeros(np.broadcast_shapes(length.shape, np.shape(goal)), dtype=bool)
         length = np.broadcast_to(length, done.shape)
         for _ in range(_STEPS):
-            tension, slope = self.pull(length, temperature, slack)
+            tension, slope = pull(length)
             correction = (goal - fixed * length - tension) / (fixed + slope)
             length = np.where(done, length, length + correction)
             done = done | (np.abs(correction) <= accepted)
             if done.all():
                 return length
-        return self._bracketed(length, done, temperature, fixed, goal, slack)
+        return self._bracketed(length, done, pull, fixed, goal)
 
     def _bracketed(
-        self,
-        length: Array,
-        done: NDArray[np.bool_],
-        temperature: Array,
-        fixed: Array,
-        goal: float | Array,
-        slack: bool,
-    ) -> Array:
+        self, length: Array, done: NDArray[np.bool_], pull: Callable[[Array], tuple[Array, Array]],
+        fixed: Array, goal: float | Array,
+    ) -> Array:  # fmt: skip
         """The same, for the elements that are not ``done``, inside a shrinking bracket."""
         # In dynamics a trial may overshoot the domain by its inertia; it is widened for that.
         span = self.longest - self.shortest
@@ -303,7 +289,7 @@ class LoadedTcas:
         point = np.where(done, length, np.clip(length, low, high))
         excess: Array = np.zeros(done.shape)
         for _ in range(_BRACKETED_STEPS):
-            tension, slope = self.pull(point, temperature, slack)
+            tension, slope = pull(point)
             excess = fixed * point + tension - goal
             low = np.where(excess < 0.0, point, low)
             high = np.where(excess > 0.0, point, high)

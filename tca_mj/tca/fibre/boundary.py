@@ -19,12 +19,12 @@ from tca_mj.rod.deadload.descent import follow
 from tca_mj.rod.deadload.wrench import DeadLoad
 from tca_mj.rod.errors import RodSolveError
 from tca_mj.rod.lie import integrate_strain, matrix_quaternion, quaternion_matrix
+from tca_mj.rod.solving import with_finer_meshes
 from tca_mj.tca.fibre.centreline import Centreline
 from tca_mj.tca.moduli import radial_growth, softening, untwist
 from tca_mj.tca.spec import FibreSpec
 
 _PER_TURN = 10  # intervals of the first mesh per turn of the frame
-_ATTEMPTS = 3  # meshes on which the path is tried, each twice as fine as the one before
 _FINEST = 50_000  # intervals
 
 
@@ -126,35 +126,34 @@ def solve_fibre(
     force, moment = within("force", force, shape=(3,)), within("moment", moment, shape=(3,))
     number("temperature", temperature, above=-273.15, unit="°C")
     require_positive(tolerance=tolerance)
-    twist = float(untwist(fibre, temperature))
     torsion = _load_torsion(centreline, fibre, force)
     stiffness = fibre_stiffness(fibre, temperature, torsion)
+    twist = float(untwist(fibre, temperature))
+
+    def meshed(count: int) -> _Meshed:
+        return _Meshed(centreline, stiffness, twist, force, moment, count)
+
+    def followed(finer: int) -> tuple[FibreShape, Array]:
+        mesh = meshed(finer * coarse)
+        state, residual = follow(mesh.problem)
+        return mesh.shape(state, residual), state
+
     if intervals is not None:
         require_count(intervals=intervals)
-        problem, scale = _scaled(centreline, stiffness, twist, force, moment, intervals)
-        return _shape(centreline, stiffness, problem, scale, *follow(problem))
+        coarse = intervals
+        return followed(1)[0]
 
-    turns = _turns(centreline, twist)
-    count = max(8, math.ceil(_PER_TURN * turns))
-    for attempt in range(_ATTEMPTS):
-        problem, scale = _scaled(centreline, stiffness, twist, force, moment, count)
-        try:
-            state, residual = follow(problem)
-            break
-        except RodSolveError:
-            if attempt == _ATTEMPTS - 1:
-                raise
-            count *= 2
-    shape = _shape(centreline, stiffness, problem, scale, state, residual)
+    coarse = max(8, math.ceil(_PER_TURN * _turns(centreline, twist)))
+    shape, state = with_finer_meshes(followed)
     while True:
-        count *= 2
-        problem, scale = _scaled(centreline, stiffness, twist, force, moment, count)
-        guess = np.empty((count + 1, problem.size))
+        count = 2 * (len(state) - 1)
+        mesh = meshed(count)
+        guess = np.empty((count + 1, mesh.problem.size))
         guess[::2] = state
         guess[1::2] = 0.5 * (state[1:] + state[:-1])
-        state, residual = problem.newton(guess)
+        state, residual = mesh.problem.newton(guess)
         # Fourth order: a fifteenth of the last change is left.
-        finer = _shape(centreline, stiffness, problem, scale, state, residual, shape.end)
+        finer = mesh.shape(state, residual, shape.end)
         if finer.error <= tolerance * centreline.length:
             return finer
         if 2 * count > _FINEST:
@@ -186,58 +185,46 @@ def _load_torsion(centreline: Centreline, fibre: FibreSpec, force: Array) -> flo
     return size * fibre.radius * math.sqrt(max(0.0, 1.0 - sin * sin)) / cold
 
 
-def _scaled(
-    centreline: Centreline,
-    stiffness: Stiffness,
-    twist: float,
-    force: Array,
-    moment: Array,
-    intervals: int,
-) -> tuple[DeadLoad, float]:
-    """The problem in units of a length a and of GJ, and a: the mean radius of the frame's turn."""
-    arc = np.linspace(0.0, centreline.length, 2 * intervals + 1)
-    reference = np.asarray(centreline.strain(arc), dtype=np.float64)
-    mean = float(np.mean(np.linalg.norm(reference, axis=1)))
-    scale = 1.0 / max(mean, 1.0 / centreline.length)
-    vectors = force[None] * (scale**2 / stiffness.torsion)
-    if moment.any():
-        vectors = np.vstack([vectors, moment * (scale / stiffness.torsion)])
-    ratio = stiffness.torsion / stiffness.bending
-    stretch = np.array([stiffness.shear, stiffness.shear, stiffness.stretch])
-    return DeadLoad(
-        step=centreline.length / intervals / scale,
-        reference=scale * reference,
-        heat=np.array([0.0, 0.0, scale * twist]),
-        angular=np.array([ratio, ratio, 1.0]),
-        linear=stiffness.torsion / scale**2 / stretch,
-        vectors=vectors @ centreline.rotation,
-    ), scale
+class _Meshed:
+    """The problem on a mesh, in units of GJ and of a length: the mean radius of the frame's turn.
 
+    Attributes:
+        problem: The scaled problem.
+    """
 
-def _shape(
-    centreline: Centreline,
-    stiffness: Stiffness,
-    problem: DeadLoad,
-    scale: float,
-    state: Array,
-    residual: float,
-    coarser: Array | None = None,
-) -> FibreShape:
-    """The shape that belongs to a solved wrench, in metres and newtons."""
-    u, v = problem.strain(state)
-    u /= scale
-    step = centreline.length / problem.intervals
-    quaternion, moved = integrate_strain(u, v, step, matrix_quaternion(centreline.rotation))
-    position = centreline.position + moved
-    change = math.nan if coarser is None else float(np.linalg.norm(position[-1] - coarser))
-    return FibreShape(
-        arc_length=np.linspace(0.0, centreline.length, problem.intervals + 1),
-        position=position,
-        quaternion=quaternion,
-        angular=u[::2],
-        linear=v[::2],
-        moment=state[:, :3] * (stiffness.torsion / scale),
-        force=state[:, 3:6] * (stiffness.torsion / scale**2),
-        residual=residual,
-        error=change / 15.0,
-    )
+    def __init__(
+        self, centreline: Centreline, stiffness: Stiffness, twist: float, force: Array,
+        moment: Array, intervals: int,
+    ) -> None:  # fmt: skip
+        self._line, self._torsion = centreline, stiffness.torsion
+        arc = np.linspace(0.0, centreline.length, 2 * intervals + 1)
+        reference = np.asarray(centreline.strain(arc), dtype=np.float64)
+        mean = float(np.mean(np.linalg.norm(reference, axis=1)))
+        self._scale = scale = 1.0 / max(mean, 1.0 / centreline.length)
+        vectors = force[None] * (scale**2 / stiffness.torsion)
+        if moment.any():
+            vectors = np.vstack([vectors, moment * (scale / stiffness.torsion)])
+        ratio = stiffness.torsion / stiffness.bending
+        stretch = np.array([stiffness.shear, stiffness.shear, stiffness.stretch])
+        self.problem = DeadLoad(
+            step=centreline.length / intervals / scale, reference=scale * reference,
+            heat=np.array([0.0, 0.0, scale * twist]), angular=np.array([ratio, ratio, 1.0]),
+            linear=stiffness.torsion / scale**2 / stretch, vectors=vectors @ centreline.rotation,
+        )  # fmt: skip
+
+    def shape(self, state: Array, residual: float, coarser: Array | None = None) -> FibreShape:
+        """The shape that belongs to a solved wrench, in metres and newtons."""
+        line, scale, intervals = self._line, self._scale, self.problem.intervals
+        u, v = self.problem.strain(state)
+        u /= scale
+        start = matrix_quaternion(line.rotation)
+        quaternion, moved = integrate_strain(u, v, line.length / intervals, start)
+        position = line.position + moved
+        change = math.nan if coarser is None else float(np.linalg.norm(position[-1] - coarser))
+        return FibreShape(
+            arc_length=np.linspace(0.0, line.length, intervals + 1), position=position,
+            quaternion=quaternion, angular=u[::2], linear=v[::2],
+            moment=state[:, :3] * (self._torsion / scale),
+            force=state[:, 3:6] * (self._torsion / scale**2),
+            residual=residual, error=change / 15.0,
+        )  # fmt: skip

@@ -8,24 +8,27 @@ section is round. "Sun" is J. Sun's dissertation, Colorado State University.
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.interpolate import make_interp_spline
 
-from tca_mj.checks import Array, floats, number, require_positive, within
+from tca_mj.checks import Array, Checked, Positive, floats, number, require_positive, within
+from tca_mj.quadrature import GaussRule
 from tca_mj.rod.lie import matrix_quaternion, quaternion_exp, quaternion_matrix, running_product
 from tca_mj.tca.catalogue import CATALOGUE
 from tca_mj.tca.spec import FibreSpec, TcaSpec
 
-# Points and weights of Gauss's quadrature on [0, 1]: two for the frames, four for the length.
+# Points of Gauss's quadrature on [0, 1]: two for the frames, four for the length.
 _GAUSS_2 = 0.5 + np.array([-0.5, 0.5]) / math.sqrt(3.0)
-_GAUSS_4, _WEIGHT_4 = (0.5 * x for x in np.polynomial.legendre.leggauss(4))
+_RULE = GaussRule.of(4)
 _NEWTON_STEPS = 50
 
 
 @dataclass(frozen=True, kw_only=True, slots=True, eq=False)
-class Centreline:
+class Centreline(Checked):
     """The fibre's reference shape: what it takes without load at the reference temperature.
 
     Attributes:
@@ -39,14 +42,13 @@ class Centreline:
         ValueError: If the length is not above 0, or position and rotation are none.
     """
 
-    length: float
+    length: Positive
     strain: Callable[[Array], Array]
-    position: Array
+    position: Annotated[Array, partial(within, shape=(3,))]
     rotation: Array
 
     def __post_init__(self) -> None:
-        require_positive(length=self.length)
-        within("position", self.position, shape=(3,))
+        Checked.__post_init__(self)
         matrix_quaternion(self.rotation)
 
     @classmethod
@@ -131,8 +133,8 @@ class Centreline:
             d1 = first(at)
             return np.cross(d1, second(at)) / np.sum(d1 * d1, axis=-1, keepdims=True)
 
-        at = t[:-1, None] + step[:, None] * (_GAUSS_4 + 0.5)
-        pieces = step * (np.linalg.norm(first(at), axis=-1) @ _WEIGHT_4)
+        at = t[:-1, None] + step[:, None] * _RULE.node
+        pieces = step * (np.linalg.norm(first(at), axis=-1) @ _RULE.weight)
         arc = np.append(0.0, np.cumsum(pieces))
         speed = np.linalg.norm(first(t), axis=1)
         tangent = first(t[0]) / speed[0]
@@ -151,15 +153,13 @@ class Centreline:
         strain = np.einsum("nij,nj->ni", quaternion_matrix(back), turn(t) / speed[:, None])
         strain[:, 2] = 0.0
         return cls(
-            length=float(arc[-1]),
-            strain=make_interp_spline(arc, strain, k=5),
-            position=points[0].copy(),
-            rotation=rotation,
-        )
+            length=float(arc[-1]), strain=make_interp_spline(arc, strain, k=5),
+            position=points[0].copy(), rotation=rotation,
+        )  # fmt: skip
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
-class ConicalTca:
+class ConicalTca(Checked):
     """A TCA wound on a cone, an Archimedean spiral of constant pitch [Sun, eq. (3.36)].
 
     p*(z) = (b z cos(a z), b z sin(a z), z), with z the height above the cone's tip; it is clamped
@@ -177,14 +177,10 @@ class ConicalTca:
     """
 
     fibre: FibreSpec
-    pitch: float
-    cone_angle: float
-    start: float
-    made_length: float
-
-    def __post_init__(self) -> None:
-        require_positive(pitch=self.pitch, start=self.start, made_length=self.made_length)
-        number("cone_angle", self.cone_angle, above=0.0, below=math.pi)
+    pitch: Positive
+    cone_angle: Annotated[float, partial(number, above=0.0, below=math.pi)]
+    start: Positive
+    made_length: Positive
 
     @property
     def winding(self) -> float:
@@ -258,20 +254,15 @@ class ConicalTca:
         binormal = np.cross(d1, d2)
         binormal /= np.linalg.norm(binormal)
         return Centreline(
-            length=self.fibre_length,
-            strain=strain,
-            position=self.position(z),
+            length=self.fibre_length, strain=strain, position=self.position(z),
             rotation=np.stack([np.cross(binormal, tangent), binormal, tangent], axis=1),
-        )
+        )  # fmt: skip
 
 
 # Sun, Tables 3.1 and 3.2 and Section 3.4.1: pitch 10.6 mm on a cone of 12 degrees, 57 mm high as
 # made, 145 mm of fibre, 5.3 coils. The start is fitted to those 145 mm: from the cone's tip
 # they would reach 63 mm.
 CONICAL = ConicalTca(
-    fibre=CATALOGUE["free-stroke"].fibre,
-    pitch=10.6e-3,
-    cone_angle=math.radians(12.0),
-    start=8.2e-3,
-    made_length=57e-3,
-)
+    fibre=CATALOGUE["free-stroke"].fibre, pitch=10.6e-3, cone_angle=math.radians(12.0),
+    start=8.2e-3, made_length=57e-3,
+)  # fmt: skip

@@ -17,12 +17,12 @@ comes first and load second, as in Sun, Fig. 3.8; sin b = s = l/l_t. Three schem
 """
 
 import math
-from collections.abc import Callable
 from typing import Literal
 
 import numpy as np
 
-from tca_mj.tca.laws.coil import Array, Coil, Equation, Heated, Law, Mask, Point, Spin, solve
+from tca_mj.tca.laws.coil import Array, Coil, Heated, Law, Mask, Point, Spin, solve
+from tca_mj.tca.laws.roots import Equation
 
 Scheme = Literal["linear", "implicit", "path"]
 
@@ -123,9 +123,7 @@ def cst_law(coil: Coil, spin: Spin, scheme: Scheme) -> Law:
         here, _ = compliance(coil, spin, sin, heated.growth2)
         return Point(half * force, 1.0 / (here + 0.0 * sin), sin, 1.0)
 
-    laws: dict[Scheme, Callable[[Heated, Array], Point]]
-    laws = {"linear": linear, "implicit": implicit, "path": path}
-    return laws[scheme]
+    return {"linear": linear, "implicit": implicit, "path": path}[scheme]
 
 
 def first_guess(coil: Coil, heated: Heated, force: Array) -> Array:

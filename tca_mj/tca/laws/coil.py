@@ -17,18 +17,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tca_mj.checks import Array
-from tca_mj.tca.laws.rod import CoilSolveError, Point, sheared
+from tca_mj.tca.laws.rod import Point, sheared
+from tca_mj.tca.laws.roots import Equation, bracketed
 from tca_mj.tca.spec import TcaSpec
 
 Mask = NDArray[np.bool_] | slice
 Spin = Literal["free", "locked"]
-Equation = Callable[[Array], tuple[Array, Array | float]]
-"""Value and slope of a rising function."""
 
 ALL = slice(None)
 _ACCEPTED = 1e-9  # last correction of Newton's method: what is left is its square, times 1000
-_CLOSED = 1e-14  # width of a bracket, or a correction, that ends the bracketed search
-_BRACKETED_STEPS = 200
 
 
 class Coil(NamedTuple):
@@ -46,13 +43,11 @@ class Coil(NamedTuple):
         """Collects the numbers of ``tca``."""
         fibre = tca.fibre
         return cls(
-            winding=tca.winding,
-            sin=math.sin(tca.pitch_angle),
+            winding=tca.winding, sin=math.sin(tca.pitch_angle),
             bending=fibre.young * fibre.second_moment,
-            torsion=fibre.shear * 2.0 * fibre.second_moment,
-            shear=1.0 / (fibre.shear * fibre.area),
+            torsion=fibre.shear * 2.0 * fibre.second_moment, shear=1.0 / (fibre.shear * fibre.area),
             stretch=1.0 / (fibre.young * fibre.area),
-        )
+        )  # fmt: skip
 
 
 class Heated(NamedTuple):
@@ -156,24 +151,5 @@ def solve(
             point = point - step
         wrong = ~((np.abs(step) <= _ACCEPTED) & (point > low) & (point < high))
         if wrong.any():
-            point[wrong] = _bracketed(equation(wrong), start[wrong], low, high)
+            point[wrong] = bracketed(equation(wrong), start[wrong], low, high)
     return point
-
-
-def _bracketed(function: Equation, point: Array, low0: float, high0: float) -> Array:
-    low, high = np.full_like(point, low0), np.full_like(point, high0)
-    point = np.where((point > low) & (point < high), point, 0.5 * (low + high))
-    done = np.zeros(point.shape, dtype=bool)
-    for _ in range(_BRACKETED_STEPS):
-        value, slope = function(point)
-        short = (value < 0.0) | (np.isnan(value) & (point < 0.0))
-        low = np.where(short & ~done, point, low)
-        high = np.where(short | done, high, point)
-        newton = point - value / slope
-        done |= (np.abs(newton - point) <= _CLOSED) | (value == 0.0) | (high - low <= _CLOSED)
-        if done.all():
-            return point
-        middle = 0.5 * (low + high)
-        newton = np.where((newton > low) & (newton < high), newton, middle)
-        point = np.where(done, point, newton)
-    raise CoilSolveError(float(np.max((high - low)[~done])))

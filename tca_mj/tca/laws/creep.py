@@ -24,11 +24,13 @@ weight gives no hysteresis, as its shift is steady, too; that is ``hysteresis_da
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tca_mj.checks import Array, floats, number, require_positive, within
+from tca_mj.checks import Array, Checked, NotNegative, Positive, Temperature, floats, number, within
 from tca_mj.tca.arrays import column
 from tca_mj.tca.laws.rod import CoilRods
 from tca_mj.tca.spec import TcaSpec
@@ -37,7 +39,7 @@ _KELVIN = 273.15
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
-class CreepSpec:
+class CreepSpec(Checked):
     """Constants of creep, hysteresis and ageing.
 
     Attributes:
@@ -57,25 +59,15 @@ class CreepSpec:
             estimate.
     """
 
-    saturation: float = 0.1903
-    half_stretch: float = 0.1036
-    room_temperature: float = 25.0
-    room_time: float = 24e3
-    activation: float = 10180.0
-    lag: float = 0.05
-    ageing_loss: float = 0.02
-    ageing_cycles: float = 10e3
-    ageing_onset: float = 100.0
-
-    def __post_init__(self) -> None:
-        require_positive(
-            half_stretch=self.half_stretch, room_time=self.room_time,
-            ageing_cycles=self.ageing_cycles, ageing_onset=self.ageing_onset,
-        )  # fmt: skip
-        for name in ("saturation", "activation", "lag"):
-            number(name, getattr(self, name), at_least=0.0)
-        number("ageing_loss", self.ageing_loss, at_least=0.0, below=1.0)
-        number("room_temperature", self.room_temperature, above=-_KELVIN, unit="°C")
+    saturation: NotNegative = 0.1903
+    half_stretch: Positive = 0.1036
+    room_temperature: Temperature = 25.0
+    room_time: Positive = 24e3
+    activation: NotNegative = 10180.0
+    lag: NotNegative = 0.05
+    ageing_loss: Annotated[float, partial(number, at_least=0.0, below=1.0)] = 0.02
+    ageing_cycles: Positive = 10e3
+    ageing_onset: Positive = 100.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -9,9 +9,10 @@ import numpy as np
 from tca_mj.checks import Array
 from tca_mj.tca.laws import castigliano
 from tca_mj.tca.laws.castigliano import Scheme, cst_law, first_guess
-from tca_mj.tca.laws.coil import ALL, Coil, Equation, Heated, Law, Mask, Spin, rod_law, solve
+from tca_mj.tca.laws.coil import ALL, Coil, Heated, Law, Mask, Spin, rod_law, solve
 from tca_mj.tca.laws.love import love_law, love_unloaded
-from tca_mj.tca.laws.rod import CoilRods, CoilSolveError, Point
+from tca_mj.tca.laws.rod import CoilRods, Point
+from tca_mj.tca.laws.roots import CoilSolveError, Equation
 from tca_mj.tca.moduli import radial_growth, softening, untwist
 from tca_mj.tca.spec import TcaSpec
 

@@ -40,30 +40,15 @@ from numpy.typing import ArrayLike, NDArray
 
 from tca_mj.checks import Array, floats, within
 from tca_mj.tca.arrays import column, frozen
+from tca_mj.tca.laws.roots import TOLERANCE, bracketed
 from tca_mj.tca.moduli import FibreTable, radial_growth, softened, softening, untwist
 from tca_mj.tca.spec import TcaSpec
 
 # Newton's steps for every element. Three are enough for all but one ordinary length in 300; what
 # has not converged goes on with a bracket around the root.
 _STEPS = 3
-_BRACKETED_STEPS = 200
-_TOLERANCE = 1e-13  # residual in length over fibre length
 _SHORTEST = 0.5  # of the minimum length: domain of the law
 _LONGEST = 0.98  # of the fibre length: domain of the law
-
-
-class CoilSolveError(ArithmeticError):
-    """The shape of a coil was not found.
-
-    Attributes:
-        residual: Largest error left in length/fibre_length [1].
-    """
-
-    def __init__(self, residual: float) -> None:
-        super().__init__(
-            f"coil not solved: length/fibre_length is off by {residual}, allowed {_TOLERANCE}"
-        )
-        self.residual = residual
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -229,12 +214,9 @@ class CoilRods:
         twist = self._twist + untwist(self._fibres, temperature)
         twisted = growth4 * self._torsion * (self._winding * sin - twist)
         return CoilShape(
-            pitch=np.arcsin(sin),
-            radius=radius,
-            tension=tension,
-            moment=share * (bent * cos + twisted * sin),
-            softening=share,
-        )
+            pitch=np.arcsin(sin), radius=radius, tension=tension,
+            moment=share * (bent * cos + twisted * sin), softening=share,
+        )  # fmt: skip
 
     def _checked(self, length: ArrayLike, temperature: ArrayLike) -> tuple[Array, Array]:
         length, temperature = floats("length", length), floats("temperature", temperature)
@@ -263,12 +245,9 @@ class CoilRods:
         growth2 = np.square(self._growth(temperature))
         growth4 = growth2 * growth2
         return _Section(
-            bias * growth4,
-            self._linear * growth4,
-            self._tangent * growth4,
-            self._shear / growth2,
+            bias * growth4, self._linear * growth4, self._tangent * growth4, self._shear / growth2,
             self._excess / growth2,
-        )
+        )  # fmt: skip
 
     def _solve(self, length: Array, temperature: Array) -> tuple[Array, Array, Array]:
         """sin b, tension and its slope over length [N/m], at the moduli of reference."""
@@ -281,8 +260,8 @@ class CoilRods:
                 sin = sin - (ratio - target) / ratio_slope
             stiff, slope, ratio, ratio_slope = _law(sin, section)
             residual = np.abs(ratio - target)
-            if not (residual <= _TOLERANCE).all():
-                sin = _repaired(sin, ~(residual <= _TOLERANCE), target, section)
+            if not (residual <= TOLERANCE).all():
+                sin = _repaired(sin, ~(residual <= TOLERANCE), target, section)
                 stiff, slope, ratio, ratio_slope = _law(sin, section)
         return sin, stiff, slope / (ratio_slope * self._fibre_length)
 
@@ -367,25 +346,13 @@ def _law(sin: Array, section: _Section) -> Point:
 def _repaired(sin: Array, wrong: NDArray[np.bool_], target: Array, section: _Section) -> Array:
     """Solves the elements marked ``wrong`` by Newton's method inside a shrinking bracket."""
     part = _Section(*(np.broadcast_to(field, target.shape)[wrong] for field in section))
-    goal = target[wrong]
-    low, high = np.full_like(goal, -1.0), np.ones_like(goal)
-    point = 0.5 * (low + high)
-    residual = np.full_like(goal, np.inf)
-    for _ in range(_BRACKETED_STEPS):
-        _, _, ratio, ratio_slope = _law(point, part)
-        residual = np.abs(ratio - goal)
-        open_ = ~(residual <= _TOLERANCE)
-        if not open_.any():
-            break
-        # Where no state exists (NaN) the coil is stretched beyond its shear: go shorter.
-        short = ratio < goal
-        low, high = np.where(short, point, low), np.where(short, high, point)
-        newton = point - (ratio - goal) / ratio_slope
-        middle = 0.5 * (low + high)
-        newton = np.where((newton > low) & (newton < high), newton, middle)
-        point = np.where(open_, newton, point)
-    else:
-        raise CoilSolveError(float(np.nan_to_num(residual, nan=np.inf).max()))
-    repaired = sin.copy()
-    repaired[wrong] = point
+    goal, repaired = target[wrong], sin.copy()
+
+    def excess(sin: Array) -> tuple[Array, Array | float]:
+        _, _, ratio, slope = _law(sin, part)
+        return ratio - goal, slope
+
+    repaired[wrong] = bracketed(
+        excess, np.zeros_like(goal), -1.0, 1.0, lambda value, *_: np.abs(value) <= TOLERANCE
+    )
     return repaired

@@ -30,7 +30,7 @@ from typing import get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tca_mj.checks import Array, within
+from tca_mj.checks import Array, require_one_of, within
 from tca_mj.tca.laws.castigliano import Scheme
 from tca_mj.tca.laws.coil import Spin
 from tca_mj.tca.laws.model import CoilModel, Model
@@ -165,10 +165,9 @@ def law_at(
 
 
 def _checked_model(tca: TcaSpec, model: Model, spin: Spin, scheme: Scheme) -> CoilModel:
-    for name, value, choice in (("model", model, Model), ("spin", spin, Spin),
-                                ("scheme", scheme, Scheme)):  # fmt: skip
-        if value not in get_args(choice):
-            raise ValueError(f"{name} must be one of {get_args(choice)}, got {value!r}")
+    require_one_of("model", model, get_args(Model))
+    require_one_of("spin", spin, get_args(Spin))
+    require_one_of("scheme", scheme, get_args(Scheme))
     return CoilModel.of(tca, model, spin, scheme)
 
 

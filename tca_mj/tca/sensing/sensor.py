@@ -1,15 +1,17 @@
 """What a real circuit measures of a TCA's resistance: noise, resolution and pulsed heating."""
 
 from dataclasses import dataclass
+from functools import partial
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tca_mj.checks import Array, floats, number, require_count, require_positive, within
+from tca_mj.checks import Array, Checked, NotNegative, Positive, require_count, within
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
-class CurrentSensor:
+class CurrentSensor(Checked):
     """What measures a TCA's resistance: its mean current under a pulsed voltage.
 
     Attributes:
@@ -21,16 +23,10 @@ class CurrentSensor:
         pulse_frequency: Of the pulsed voltage, Sun, Section 2.3.2 [Hz].
     """
 
-    resolution: float = 0.8e-3
-    gain_error: float = 0.0
-    noise: float = 1.3e-3
-    pulse_frequency: float = 4e3
-
-    def __post_init__(self) -> None:
-        number("resolution", self.resolution, at_least=0.0)
-        number("noise", self.noise, at_least=0.0)
-        number("gain_error", self.gain_error, above=-1.0, below=1.0)
-        require_positive(pulse_frequency=self.pulse_frequency)
+    resolution: NotNegative = 0.8e-3
+    gain_error: Annotated[float, partial(within, above=-1.0, below=1.0, shape=())] = 0.0
+    noise: NotNegative = 1.3e-3
+    pulse_frequency: Positive = 4e3
 
 
 def measured(
@@ -66,8 +62,7 @@ def measured(
     voltage = within("voltage", voltage, above=0.0, unit="V")
     share = duty = within("duty", duty, above=0.0, at_most=1.0)
     if window is not None:
-        require_positive(window=window)
-        share = pulse_mean(duty, window * sensor.pulse_frequency)
+        share = pulse_mean(duty, within("window", window, above=0.0) * sensor.pulse_frequency)
     least = 10.0 * max(sensor.resolution, sensor.noise)
     current = within("mean current", share * voltage / resistance, above=least, unit="A")
     noise = sensor.noise * rng.standard_normal(current.shape)
@@ -136,7 +131,7 @@ def moving_average(values: ArrayLike, count: int, start: ArrayLike | None = None
     if values.ndim == 0:
         raise ValueError(f"values must have an axis of samples, got {values}")
     averages = np.empty_like(values)
-    average = values[:1].sum(axis=0) if start is None else floats("start", start)
+    average = values[:1].sum(axis=0) if start is None else within("start", start)
     for i, value in enumerate(values):
         average = average + (value - average) / count
         averages[i] = average

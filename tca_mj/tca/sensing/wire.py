@@ -27,7 +27,7 @@ import numpy as np
 from numpy.polynomial import Polynomial
 from numpy.typing import ArrayLike
 
-from tca_mj.checks import Array, number, within
+from tca_mj.checks import Array, Checked, Finite, NotNegative, number, within
 from tca_mj.tca.arrays import column
 from tca_mj.tca.spec import TcaSpec
 
@@ -52,11 +52,9 @@ class WireTable(NamedTuple):
         """Collects the numbers of ``specs``, in their order."""
         rest_length = column(specs, "rest_length")
         return cls(
-            rest_length=rest_length,
-            rest_resistance=rest_length * column(specs, "resistance_per_length"),
-            stretch=column(specs, "stretch_resistance"),
-            contraction=column(specs, "contraction_resistance"),
-        )
+            rest_length, rest_length * column(specs, "resistance_per_length"),
+            column(specs, "stretch_resistance"), column(specs, "contraction_resistance"),
+        )  # fmt: skip
 
 
 def resistance(wire: WireTable, length: ArrayLike, temperature: ArrayLike) -> Array:
@@ -102,7 +100,7 @@ def sensed_length(wire: WireTable, resistance: ArrayLike) -> Array:
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
-class SensingSpec:
+class SensingSpec(Checked):
     """What little load and temperature do to the resistance of a TCA that contracts.
 
     Attributes:
@@ -115,14 +113,9 @@ class SensingSpec:
         reference_temperature: Temperature at which that rise is 0 [°C].
     """
 
-    load: float = 0.123 / (14.0 * 0.110)
-    temperature: float = 0.0
-    reference_temperature: float = 25.0
-
-    def __post_init__(self) -> None:
-        number("load", self.load, at_least=0.0)
-        for name in ("temperature", "reference_temperature"):
-            number(name, getattr(self, name))
+    load: NotNegative = 0.123 / (14.0 * 0.110)
+    temperature: Finite = 0.0
+    reference_temperature: Finite = 25.0
 
 
 def resistance_displacement(
@@ -208,8 +201,6 @@ def fit_displacement(
     polynomial = Polynomial.fit(resistance, displacement, degree)
     error = polynomial(resistance) - displacement
     return DisplacementFit(
-        polynomial=polynomial,
-        rmse=math.sqrt(float(np.mean(error * error))),
-        lowest=float(resistance.min()),
-        highest=float(resistance.max()),
-    )
+        polynomial=polynomial, rmse=math.sqrt(float(np.mean(error * error))),
+        lowest=float(resistance.min()), highest=float(resistance.max()),
+    )  # fmt: skip

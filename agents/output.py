@@ -1,0 +1,28 @@
+"""Results as files that are whole at any moment: JSON and CSV."""
+
+import csv
+import io
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from tca_mj.files import write_whole
+
+Row = Mapping[str, Any]
+
+
+def write_json(path: Path, value: Any, *, indent: int = 2) -> Path:
+    """Writes a value as JSON."""
+    text = json.dumps(value, indent=indent, ensure_ascii=False)
+    return write_whole(path, f"{text}\n".encode())
+
+
+def write_csv(path: Path, rows: Sequence[Row], columns: Sequence[str] = ()) -> Path:
+    """Writes rows as CSV, by default with all their keys in the order in which they come up."""
+    text = io.StringIO()
+    names = columns or list(dict.fromkeys(key for row in rows for key in row))
+    table = csv.DictWriter(text, names, lineterminator="\n")
+    table.writeheader()
+    table.writerows(rows)
+    return write_whole(path, text.getvalue().encode())
