@@ -10,7 +10,7 @@ do the work that this length says: see ``tca_mj.model.smooth``.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Literal
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -25,6 +25,7 @@ from tca_mj.model.spines import Spines
 from tca_mj.tca import (
     CalibrationError,
     CoilSolveError,
+    LawChoice,
     Pull,
     Supply,
     TcaBank,
@@ -98,7 +99,7 @@ class Simulation:
         timestep: float = 2e-3,
         tca_period: float = 2e-2,
         ambient: float = 25.0,
-        law: Literal["rod", "surface"] = "surface",
+        law: LawChoice = "surface",
         supply: Supply | None = None,
     ) -> None:
         """Compiles ``part``; its specification can still be changed and compiled again.
@@ -459,7 +460,7 @@ class Simulation:
             )
 
 
-def _bank(specs: Sequence[Any], law: Literal["rod", "surface"], ambient: float) -> Any:
+def _bank(specs: Sequence[Any], law: LawChoice, ambient: float) -> Any:
     """The bank of all muscles."""
     kinds: dict[type, list[int]] = {}
     for place, spec in enumerate(specs):
@@ -476,9 +477,7 @@ def _bank(specs: Sequence[Any], law: Literal["rod", "surface"], ambient: float) 
     return MixedBank(specs, banks)
 
 
-def _tca_bank(
-    specs: Sequence[TcaSpec], law: Literal["rod", "surface"], ambient: float
-) -> TcaBank:
+def _tca_bank(specs: Sequence[TcaSpec], law: LawChoice, ambient: float) -> TcaBank:
     surrounded = tuple(replace(spec, ambient=ambient) for spec in specs)
     try:
         return TcaBank(surrounded, law)

@@ -77,8 +77,8 @@ def read(path: str | Path) -> Recording:
                     values[entity] += [row[0] if row else np.nan for row in rows]
     except Exception as error:
         raise ValueError(
-            f"path must be a whole recording, got {path}: {error}; one that was cut off is mended by"
-            f" rerun rrd merge {path} -o whole.rrd"
+            f"path must be a whole recording, got {path}: {error}; one that was cut off is"
+            f" mended by: rerun rrd merge {path} -o whole.rrd"
         ) from error
     curves = {}
     for entity in sorted(values):
