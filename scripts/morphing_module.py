@@ -5,7 +5,6 @@
 Without a way to OpenGL only the tables can be had.
 """
 
-import argparse
 import math
 import time
 from pathlib import Path
@@ -22,6 +21,7 @@ from tca_mj.agents.scripts.morph import MorphPolicy
 from tca_mj.control.morph import Measurement, Phase
 from tca_mj.envs.morph import MorphModule, hanging_module
 from tca_mj.modules.morphing import MorphingSpec, morphing_module
+from tca_mj.pages import folder_of_pictures
 from tca_mj.record.render import Offscreen, colour_tendons
 from tca_mj.sim import Simulation
 from tca_mj.smp.lumped import LumpedModule
@@ -329,17 +329,13 @@ def overhead() -> str:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--out", type=Path, default=Path(__file__).parents[1] / "docs/pictures")
-    parser.add_argument("--tables", action="store_true", help="print the tables, draw nothing")
-    args = parser.parse_args()
-    if args.tables:
+    out = folder_of_pictures(__doc__, Path(__file__).parents[1] / "docs/pictures")
+    if out is None:
         for table in (holding_table, lumped_table, node_table, speed_table, policy_table, overhead):
             print(table(), end="\n\n", flush=True)
         return
-    args.out.mkdir(parents=True, exist_ok=True)
-    draw_course(args.out / "morphing_course.png")
-    draw_shapes(args.out / "morphing_shapes.png")
+    draw_course(out / "morphing_course.png")
+    draw_shapes(out / "morphing_shapes.png")
 
 
 if __name__ == "__main__":

@@ -1,6 +1,5 @@
 """Draws docs/pictures/smp_*.png of docs/shape-memory.md; --tables prints its tables instead."""
 
-import argparse
 import math
 from pathlib import Path
 from typing import Any
@@ -11,6 +10,7 @@ from matplotlib.figure import Figure
 
 from tca_mj.control.morph import ClosedLoop, Measurement, MorphSequence, Phase
 from tca_mj.control.pi import PiSpec
+from tca_mj.pages import folder_of_pictures
 from tca_mj.smp import HeaterSpec, SmpSpec, SpineSpec, SpineState, advance, recovery, spring
 from tca_mj.smp.heater import COOL_TIME, FAN_COOL_TIME, HOLD_TEMPERATURE
 from tca_mj.smp.lumped import LumpedModule, ModuleState, in_tube
@@ -238,13 +238,9 @@ def draw_morph(figure: Figure) -> None:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--out", type=Path, default=Path(__file__).parents[1] / "docs/pictures")
-    parser.add_argument("--tables", action="store_true", help="print the tables, draw nothing")
-    args = parser.parse_args()
-    if args.tables:
+    out = folder_of_pictures(__doc__, Path(__file__).parents[1] / "docs/pictures")
+    if out is None:
         return print(*heat_tables(), speed_table(), sep="\n\n")
-    args.out.mkdir(parents=True, exist_ok=True)
     for draw in (draw_modulus, draw_heat, draw_fixing, draw_morph):
         size = (8.0, 6.2) if draw is draw_morph else (8.0, 4.3)
         draw(figure := Figure(figsize=size, layout="constrained"))
@@ -252,7 +248,7 @@ def main() -> None:
             axis.grid(color="#e6e6e6")
             axis.set_axisbelow(True)
             axis.spines[["top", "right"]].set_visible(False)
-        figure.savefig(args.out / f"smp_{draw.__name__[5:]}.png", dpi=120)
+        figure.savefig(out / f"smp_{draw.__name__[5:]}.png", dpi=120)
 
 
 if __name__ == "__main__":

@@ -1,6 +1,5 @@
 """Draws the figures of docs/tca.md, docs/pictures/tca_*.png; --tables prints tables instead."""
 
-import argparse
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,6 +9,7 @@ from scipy.optimize import brentq
 
 from tca_mj.modules.bending import BendingSpec
 from tca_mj.modules.twisting import TwistingSpec
+from tca_mj.pages import folder_of_pictures
 from tca_mj.record.plots import temperature_colour
 from tca_mj.tca import CATALOGUE, CoilRods, HeatStep, TcaBank, TcaSpec, coil_tension
 
@@ -111,19 +111,15 @@ def draw_heat(figure: Figure) -> None:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--out", type=Path, default=Path(__file__).parents[1] / "docs/pictures")
-    parser.add_argument("--tables", action="store_true", help="print the tables, draw nothing")
-    args = parser.parse_args()
-    if args.tables:
+    out = folder_of_pictures(__doc__, Path(__file__).parents[1] / "docs/pictures")
+    if out is None:
         return print(*tables(), sep="\n\n")
-    args.out.mkdir(parents=True, exist_ok=True)
     for draw in (draw_tension, draw_stroke, draw_heat):
         draw(figure := Figure(figsize=(8.0, 4.3), layout="constrained"))
         for axis in figure.axes:
             axis.grid(color="#e6e6e6")
             axis.spines[["top", "right"]].set_visible(False)
-        figure.savefig(args.out / f"tca_{draw.__name__[5:]}.png", dpi=120)
+        figure.savefig(out / f"tca_{draw.__name__[5:]}.png", dpi=120)
 
 
 if __name__ == "__main__":

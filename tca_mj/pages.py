@@ -1,5 +1,6 @@
 """Results as pages: tables and pictures in Markdown, and the same as data beside them."""
 
+import argparse
 import json
 from collections.abc import Iterable, Sequence
 from pathlib import Path
@@ -48,3 +49,21 @@ def write_result(
     data = json.dumps(result, indent=indent, ensure_ascii=False)
     for ending, content in ((".json", data), (".md", text)):
         write_whole(out / f"{name}{ending}", f"{content}\n".encode())
+
+
+def folder_of_pictures(about: str | None, usual: Path) -> Path | None:
+    """Where a script puts its pictures, from its command line; None if it is to print its tables.
+
+    Args:
+        about: What the script does.
+        usual: The folder if none is given; it is made if it is missing.
+    """
+    parser = argparse.ArgumentParser(description=about)
+    parser.add_argument("--out", type=Path, default=usual)
+    parser.add_argument("--tables", action="store_true", help="print the tables, draw nothing")
+    asked = parser.parse_args()
+    if asked.tables:
+        return None
+    out: Path = asked.out
+    out.mkdir(parents=True, exist_ok=True)
+    return out

@@ -3,6 +3,7 @@
 import json
 import math
 import re
+import tomllib
 from dataclasses import asdict, replace
 from pathlib import Path
 
@@ -28,9 +29,20 @@ from tca_mj.validation import (
     theories,
     threads,
 )
-from tca_mj.validation.facts import Finding, check, not_covered, reasons, table, tally, trend
+from tca_mj.validation.facts import (
+    Finding,
+    check,
+    finding,
+    not_covered,
+    reasons,
+    table,
+    tally,
+    trend,
+    words,
+)
 
-PAGE = Path(__file__).resolve().parent.parent / "docs" / "validation.md"
+ROOT = Path(__file__).resolve().parent.parent
+PAGE = ROOT / "docs" / "validation.md"
 
 
 @pytest.fixture(scope="module")
@@ -110,6 +122,38 @@ def test_what_is_missed_needs_a_reason():
         Finding(source="s", fact="f", published="p", band="", model="", verdict="fine")  # type: ignore[arg-type]
     assert trend("s", "f", "p", "o", "m", True, strict=True).verdict == "held"
     assert trend("s", "f", "p", "o", "m", False, reason="r").verdict == "trend missed"
+
+
+def test_every_fact_of_the_file_is_judged_somewhere():
+    """No table or text that no code names, and no name without one."""
+    folder = ROOT / "tca_mj" / "validation"
+    tables = tomllib.loads((folder / "facts.toml").read_text(encoding="utf-8"))
+    texts = tables.pop("words")
+    code = "".join(path.read_text(encoding="utf-8") for path in folder.glob("*.py"))
+    named = set(re.findall(r'\bfinding\(\s*"([a-z0-9-]+)"', code))
+    chosen = {"free-stroke", "free-stroke-of-type-0"}  # by the name of the type
+    assert named | chosen == set(tables)
+    assert set(re.findall(r"\bwords\(\s*['\"]([a-z0-9-]+)", code)) == set(texts)
+
+
+def test_a_fact_of_the_file_is_of_the_kind_that_its_keys_say():
+    assert finding("contact-length", 70.0).band == "69.5 to 70.5 mm"
+    assert finding("contact-length", 71.0).verdict == "missed"
+    assert finding("pull", 0.5, name="A", low=0.4).band == "at least 0.40 N"
+    assert finding("creep-cold", 12.3).model == "12 % done in 20 h"
+    assert finding("creep-cold", 12.3).verdict == "fitted"
+    assert finding("feels", held=True, right=3, runs=4).verdict == "trend held"
+    assert finding("feels", held=False, right=3, runs=4).verdict == "trend missed"
+    assert finding("finger-control").verdict == "not covered"
+    assert words("arm-leaves", time=2.0) == "From 2 s on it leaves its plane."
+    for key in ("nothing", "pull"):  # no table; a field that is not given
+        with pytest.raises(KeyError):
+            finding(key, 1.0)
+    for key, wanted in (("contact-length", "value must"), ("feels", "held must")):
+        with pytest.raises(ValueError, match=wanted):
+            finding(key, right=3, runs=4)
+    with pytest.raises(ValueError, match="band"):  # neither the file nor the code has one
+        finding("pull", 0.5, name="A")
 
 
 def test_the_table_and_the_list_of_reasons():

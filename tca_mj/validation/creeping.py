@@ -8,11 +8,10 @@ import numpy as np
 from tca_mj.checks import Array
 from tca_mj.tca import CATALOGUE, TcaSpec, hanging_length
 from tca_mj.tca.laws.creep import CreepBank, CreepSpec, aged, relaxation_time
-from tca_mj.validation.facts import Finding, fitted, trend
+from tca_mj.validation.facts import Finding, finding
 from tca_mj.validation.strokes import Ends, contraction, weight
 
 _HOUR = 3600.0
-_SOURCE = "Section 2.2.2"
 # Durations [s]: at rest, cold with the weight, hot, cold again (100 s, Sun); estimates otherwise.
 _LOADED, _HEATED, _HOT, _COOLED = 120.0, 300.0, 4.0, 100.0
 
@@ -30,30 +29,21 @@ def four_lengths(tca: TcaSpec, ends: Ends) -> Array:
 def findings() -> list[Finding]:
     """Order l1 < l2 < l4 < l3, and what was fitted; loss of stroke in 10,000 cycles at 2 MPa."""
     rows = []
+    new = CATALOGUE["type-1-180"]
     named: dict[Ends, str] = {"locked": "glued", "free": "free to spin"}
     for ends, name in named.items():
-        l1, l2, l3, l4 = four_lengths(CATALOGUE["type-1-180"], ends)
-        rows.append(trend(
-            _SOURCE, f"20 g on type 1-180, ends {name}", "l1 < l2 < l4 < l3", "l1 < l2 < l4 < l3",
-            f"{l1:.1f}, {l2:.1f}, {l4:.1f}, {l3:.1f} mm", bool(l1 < l2 < l4 < l3), strict=True,
-            value=float(l4 - l2),
-            note="l1 natural, l2 just loaded, l3 crept under the load, l4 without it again.",
-        ))  # fmt: skip
-    bank = CreepBank([CATALOGUE["type-1-180"]])
+        l1, l2, l3, l4 = four_lengths(new, ends)
+        rows.append(finding("four-lengths", float(l4 - l2), bool(l1 < l2 < l4 < l3),
+                            name=name, l1=l1, l2=l2, l3=l3, l4=l4))  # fmt: skip
+    bank = CreepBank([new])
     after = bank.step(bank.rest(), weight(20), 25.0, 20.0 * _HOUR)
-    done = 100.0 * float(after.shift[0] / bank.settled([weight(20)])[0])
-    hot = float(relaxation_time(150.0, CreepSpec()))
-    new = CATALOGUE["type-1-180"]
     old = aged(new, 10e3, CreepSpec())
     loss = 100.0 * (1.0 - contraction(old, 20, 100.0) / contraction(new, 20, 100.0))
     return [
         *rows,
-        fitted(_SOURCE, "creep at room temperature", "about 20 h", f"{done:.0f} % done in 20 h",
-               "`CreepSpec.room_time`.", value=done),
-        fitted(_SOURCE, "creep when hot", "within a heating cycle", f"{hot:.1f} s at 150 °C",
-               "`CreepSpec.activation`, with 1 s as an estimate.", value=hot),
-        fitted(_SOURCE, "stroke after 10,000 cycles at 0.25 Hz, 2 MPa", "2 % less",
-               f"{loss:.1f} % less", "`CreepSpec.ageing_loss`.", value=loss),
+        finding("creep-cold", 100.0 * float(after.shift[0] / bank.settled([weight(20)])[0])),
+        finding("creep-hot", float(relaxation_time(150.0, CreepSpec()))),
+        finding("ageing", loss),
     ]  # fmt: skip
 
 

@@ -15,7 +15,7 @@ from scipy.optimize import brentq
 
 from tca_mj.checks import Array, number, require_positive
 from tca_mj.tca import CATALOGUE, CoilRods, TcaSpec, tension
-from tca_mj.validation.facts import Finding, check, not_covered
+from tca_mj.validation.facts import Finding, finding
 from tca_mj.validation.strokes import TYPES
 
 Pull = Callable[[float, float], float]
@@ -129,24 +129,11 @@ def findings() -> list[Finding]:
     slides = holds(touching, ANNEALED)
     ends = brentq(lambda hot: holds(touching, hot) - FRICTION, ANNEALED, 259.0, xtol=0.1)
     mass, count, way = KETTLE
-    source = "Section 2.1.1"
     five = count * holds(tca.rest_length - 1e-3 * way, ANNEALED)
     return [
-        check(source, f"pull of {NAME} at its natural length, 160 °C",
-              "overcomes a peak friction of 0.4 N", blocked, FRICTION, np.inf, "N", digits=2,
-              note="With the moduli of Chapter 3 on thread of 0.34 mm it was 0.23 N."),
-        check(source, f"{NAME} drags 0.4 N", "over its free stroke of 48 %", share, STROKE - 1.5,
-              STROKE + 1.5, "%",
-              note=f"Heated to {ANNEALED:.0f} °C, where it was annealed, at once, which takes it"
-              f" furthest; by 5 K/s it goes {slow:.0f} %. No temperature is named.",
-              reason=f"It loses its pull as it contracts: at the end of the free stroke"
-              f" {slides:.2f} N are left at {ANNEALED:.0f} °C, and 0.4 N are reached at"
-              f" {ends:.0f} °C only. What is printed is the peak of the friction; sliding friction"
-              " may be less, but hardly a fifth. More untwist would mend it (the table of threads),"
-              " at the cost of what overlaps below 70 °C and of the 60 mm at 1 A."),
-        not_covered(source, f"five drag a kettle of {mass:g} kg", "by 60 mm",
-                    "the friction of the kettle is not printed. Five TCAs pull five times as much"
-                    f" as one: {count * blocked:.1f} N at 160 °C, and {five:.2f} N after 60 mm at"
-                    f" {ANNEALED:.0f} °C, the friction of a kettle with a coefficient of"
-                    f" {five / mass / 9.81:.2f}."),
+        finding("pull", blocked, name=NAME, low=FRICTION),
+        finding("drag", share, name=NAME, low=STROKE - 1.5, high=STROKE + 1.5, annealed=ANNEALED,
+                slow=slow, slides=slides, ends=ends),
+        finding("kettle", mass=mass, all=count * blocked, five=five, annealed=ANNEALED,
+                coefficient=five / mass / 9.81),
     ]  # fmt: skip

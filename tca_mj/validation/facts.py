@@ -3,12 +3,17 @@
 Facts are of two kinds. A *check* has a band, and the model's value lies in it or not. A *trend* has
 a sign or an order only, because the measured curve behind it was not published. A fact that fixed
 a constant of the model is *fitted*, whatever its value: agreement with it proves nothing.
+
+``facts.toml`` holds what is printed and how it is told; ``finding`` judges one fact of it.
 """
 
 import math
+import tomllib
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Literal, get_args
+from functools import cache
+from pathlib import Path
+from typing import Any, Literal, get_args
 
 from tca_mj import pages
 
@@ -117,6 +122,58 @@ def fitted(
 def not_covered(source: str, fact: str, published: str, reason: str) -> Finding:
     """A fact that needs something that is not in these models."""
     return Finding(source, fact, published, "-", "-", "not covered", reason)
+
+
+@cache
+def _file() -> dict[str, dict[str, Any]]:
+    """Tables of ``facts.toml``, each text on one line, read once."""
+    tables = tomllib.loads(Path(__file__).with_name("facts.toml").read_text(encoding="utf-8"))
+    return {key: {name: " ".join(cell.split()) if isinstance(cell, str) else cell
+                  for name, cell in rows.items()} for key, rows in tables.items()}  # fmt: skip
+
+
+def words(key: str, **fields: Any) -> str:
+    """A text of ``facts.toml`` that is no fact, from its table ``words``, filled with fields."""
+    text: str = _file()["words"][key].format(**fields)
+    return text
+
+
+def finding(
+    key: str, value: float | None = None, held: bool | None = None, **fields: Any
+) -> Finding:
+    """A fact of ``facts.toml``, judged.
+
+    The keys of its table are arguments of ``check`` if it has a unit, of ``trend`` if it has an
+    order, of ``fitted`` if it says to what, and otherwise of ``not_covered``.
+
+    Args:
+        key: Name of the table.
+        value: What the model gives, in the unit of the fact; only a check needs it.
+        held: Whether a trend is there.
+        fields: What fills the texts, as in ``str.format``, besides ``value``; ``low`` and ``high``
+            are the band of a check where the file has none.
+
+    Raises:
+        KeyError: If there is no such table, or a text names a field that is not given.
+        ValueError: As ``check``; or if the value of a check or the outcome of a trend is missing.
+    """
+    row = _file()[key]
+    told: dict[str, Any] = {
+        name: cell.format(value=value, **fields) if isinstance(cell, str) else cell
+        for name, cell in row.items()
+    }
+    if "to" in row:
+        return fitted(**told, value=value)
+    if "order" in row:
+        if held is None:
+            raise ValueError(f"held must say whether {key!r} is, got none")
+        return trend(**told, held=held, value=value)
+    if "unit" in row:
+        if value is None:
+            raise ValueError(f"value must be what the model gives for {key!r}, got none")
+        band = {"low": -math.inf, "high": math.inf} | fields | told
+        return check(**told | {name: band[name] for name in ("low", "high")}, value=value)
+    return not_covered(**told)
 
 
 def table(findings: Iterable[Finding]) -> str:

@@ -19,7 +19,7 @@ from tca_mj.tca import CATALOGUE, Heating, Load, LoadedTcas, TcaBank, TcaMelted,
 from tca_mj.tca.dynamics.loads import Course
 from tca_mj.tca.embedding import silicone_body
 from tca_mj.tca.thermal import BodyHeat
-from tca_mj.validation.facts import Finding, check, fitted, trend
+from tca_mj.validation.facts import Finding, finding, words
 from tca_mj.validation.race import NAMES, run
 from tca_mj.validation.sensors import SENSED, crept
 from tca_mj.validation.strokes import heat_up
@@ -245,34 +245,10 @@ def table() -> str:
     heads = ["mass, loss, resistance, slope", "mass [mg]", "0.8 V [mA]", "warms [K]",
              "1 A, 2 s [°C]", "moves [mm]", "5, 6 V [°C]", "12 V [m/s²]", "holds 40 mm [W]",
              "1.5, 2.5 A bare [°C]", "in silicone [°C]", "finger [ohm]", "held"]  # fmt: skip
-    (cylinder, thread, draught), (hot_cylinder, hot_thread, hot_draught) = (
-        [1e3 * taken for taken in bounds(hot).values()] for hot in (27.0, 160.0)
-    )
-    return pages.page(
-        "Every thermal fact under every reading. *Mass*: weighed (32 mg per TCA, 117 mg/m), or"
-        " computed, 1300 kg/m³ on the circle of 0.21 mm. *Loss*: h c_s = 23 x 2.5 W/(m² K) on"
-        " thread of 0.17 or 0.21 mm radius, or 32, 56 and 64 mW/K of 350 mm. *Resistance*: what"
-        " 6.7 ohm/dm are counted on, or 10 ohm per 350 mm of thread. *Slope*: how much it rises"
-        " over the free stroke. A dash is a fibre that melts. Stars: in use, ** for the TCAs of"
-        " Chapter 2, * by default.",
-        pages.table(heads, rows),
-        "Air takes, per metre of thread and kelvin (27 and 160 °C): from the coil's outer cylinder"
-        f" {cylinder:.0f} and {hot_cylinder:.0f} mW, from a single thread {thread:.0f} and"
-        f" {hot_thread:.0f} mW, in a draught of 0.4 m/s {draught:.0f} and {hot_draught:.0f} mW. By"
-        f" default a TCA loses {1e3 * LOSSES['0.21']:.0f} mW, those of Chapter 2"
-        f" {1e3 * LOSSES['56 mW/K']:.0f}.",
-        "No reading holds everything, because Chapters 2 and 4 contradict each other: around 80 mA"
-        " need a resistance at which 2.5 A melt a bare TCA, and the finger has less. So each"
-        " chapter keeps what was measured in it. TCAs of Chapter 2 have the made length's"
-        " resistance, and the loss that 60 mm need; with it the camera's 1 to 2 °C and the steady"
-        " errors of the controller follow, which nothing was fitted to. All others have the natural"
-        " length's resistance (finger, pulses of Section 4.3.4) and the identified loss, which lies"
-        " between what still air takes from an outer cylinder and from a single thread; most of"
-        " them lie in silicone, where that loss does not count. The mass is the weighed one: the"
-        " computed one slows the start at 12 V, and is twice what the scales say. What 5 and 6 V"
-        " did to the free-stroke TCA decides nothing: with the identified loss only the thread's"
-        " length survives it, and that contradicts every other resistance.",
-    )
+    cold, hot = ([1e3 * taken for taken in bounds(at).values()] for at in (27.0, 160.0))
+    default, in_use = (1e3 * LOSSES[one.loss] for one in (DEFAULTS, IN_USE))
+    air = words("heat-air", cold=cold, hot=hot, default=default, in_use=in_use)
+    return pages.page(words("heat-choices"), pages.table(heads, rows), air, words("heat-result"))
 
 
 def _hot(*values: float | None) -> str:
@@ -281,47 +257,18 @@ def _hot(*values: float | None) -> str:
 
 def findings() -> list[Finding]:
     """Masses, current, warming, resistances, pulses."""
-    found = heated(IN_USE)
-    default = heated(DEFAULTS)
-    named = 1e6 * 4 * 23.5e-6 * THREAD
-    line = 1e6 * _COIL.fibre.line_density
+    found, default = heated(IN_USE), heated(DEFAULTS)
     solid = 1e6 * 1300.0 * math.pi * 0.17e-3**2
-    rise = 100.0 * _COIL.contraction_resistance * 0.357
     hottest = max(math.inf if value is None else value
                   for value in (*default.pulses, *default.soft))  # fmt: skip
     return [
-        check("Section 2.1.1", "mass of a TCA of Chapter 2, from its thread",
-              "0.03 g, five 0.16 g", named, 28.8, 35.2, "mg",
-              note="235/36 dtex, 4 ply, 350 mm before twisting; the catalogue has the weighed"
-              " 32 mg. The band is 10 %."),
-        check("Table 3.2", "mass of the twisted thread of Chapter 3", "1300 kg/m³, 0.34 mm",
-              line, 0.9 * solid, 1.1 * solid, "mg/m", digits=0,
-              note="From the thread's title and its shortening from 218 to 175 mm, against density"
-              " and thickness. The band is 10 %."),
-        fitted("Section 2.3.1", "current of the cold TCA of 110 mm at 0.8 V",
-               "around 80 mA, 6.7 ohm per dm", f"{found.current:.0f} mA",
-               "it chose the made length of the TCAs of Chapter 2 as what 6.7 ohm/dm are counted"
-               f" on: by the natural one it would be {default.current:.0f} mA, by the thread"
-               " 34 mA.",
-               value=found.current),
-        check("Section 2.3.1", "how much 0.8 V warm that TCA", "1 to 2 °C", found.warming,
-              *WARMED, "K", note="By an infrared camera, which reads a thin coil low."
-              f" The default loss and the natural length give {default.warming:.1f} K."),
-        fitted("Section 3.1.1", "resistance while it contracts", "changes by about 20 %",
-               f"{rise:.0f} % over the free stroke of 35.7 %", "`TcaSpec.contraction_resistance`.",
-               value=rise),
-        trend("Section 2.3.1", "20 g at 12 V: acceleration", "0.2 m/s² at most",
-              "at most 0.2 m/s² until 40 mm", f"{found.acceleration:.2f} m/s²",
-              found.acceleration <= ACCELERATION, value=found.acceleration,
-              reason="It is largest at the start, where 16 W warm the weighed mass by 390 K/s; from"
-              " 12 mm on it is below 0.2. The mass that density and circle give, twice the weighed"
-              " one, would hold it."),
-        check("Section 4.3.4", "100 mm, 1.5 A for 0.8 s and 2.5 A for 0.3 s: hottest",
-              "it is not damaged", hottest, -math.inf, _COIL.fibre.melting_temperature, "°C",
-              digits=0, note="Bare, which is the worst case, with the default loss and 6.7 ohm; the"
-              f" band is the melting point. In silicone {_hot(*default.soft)} °C."),
-        check("Section 4.2.2", "resistance of a finger's two TCAs of 45 mm", "6.6 ohm",
-              default.finger, 0.9 * FINGER, 1.1 * FINGER, "ohm",
-              note="By the natural length, which all TCAs but those of Chapter 2 have; leads are"
-              f" not counted. The band is 10 %; by the made length {found.finger:.1f} ohm."),
+        finding("thread-mass", 1e6 * 4 * 23.5e-6 * THREAD),
+        finding("twisted-mass", 1e6 * _COIL.fibre.line_density, low=0.9 * solid, high=1.1 * solid),
+        finding("cold-current", found.current, default=default),
+        finding("warming", found.warming, low=WARMED[0], high=WARMED[1], default=default),
+        finding("contraction-resistance", 100.0 * _COIL.contraction_resistance * 0.357),
+        finding("acceleration", found.acceleration, found.acceleration <= ACCELERATION),
+        finding("pulses", hottest, high=_COIL.fibre.melting_temperature, soft=_hot(*default.soft)),
+        finding("finger-resistance", default.finger, low=0.9 * FINGER, high=1.1 * FINGER,
+                found=found),
     ]  # fmt: skip

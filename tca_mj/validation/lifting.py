@@ -18,7 +18,7 @@ from tca_mj.control import PiSpec, pi_rest, pi_step
 from tca_mj.tca import Heating, Load, LoadedTcas, LoadState, TcaSpec, resistance
 from tca_mj.tca.sensing.sensor import measured, moving_average, pulse_power
 from tca_mj.tca.sensing.wire import fit_displacement, resistance_displacement
-from tca_mj.validation.facts import Finding, fitted, not_covered, trend
+from tca_mj.validation.facts import Finding, finding
 from tca_mj.validation.sensors import SENSED, WIRE, crept, under
 from tca_mj.validation.strokes import DEVIATION, weight
 
@@ -36,7 +36,6 @@ _LATE = 5.0  # the steady state is the mean of the last seconds [s]
 BLOWN = 2.0  # factor of blown air on the heat transfer, an estimate
 _RINGING = 0.5  # K_I that is "too large": an estimate
 _HOLD = 5.0  # lifting and 2 s of holding, an estimate [s]
-_SOURCE = "Section 2.3.2"
 
 
 class Response(NamedTuple):
@@ -186,50 +185,22 @@ def steps() -> list[Finding]:
     """Step responses."""
     integral, proportional, blown = over_integral(), over_proportional(), in_blown_air()
     error = 100.0 * (1.0 - integral.steady / GOAL)
-    late = 100.0 * (1.0 - proportional.steady / GOAL)
-    rise = proportional.rise()
+    rise, swings = proportional.rise(), integral.swings
     over = 100.0 * (proportional.displacement.max(axis=0) / GOAL - 1.0)
     before = blown.displacement[blown.time <= AIR_AT][-1]
     lowest = blown.displacement[blown.time > AIR_AT].min(axis=0)
     end = blown.displacement[-100:].mean(axis=0)
     back = 100.0 * (end - lowest) / (before - lowest)
-    hottest = integral.temperature[:, 3].max()
     calm, windy = (blown.power[which][-100:, 1].mean() for which in (blown.time <= AIR_AT, ...))
-    works = (f"Air that doubles the heat loss (an estimate) for 15 s; {calm:.1f} W become"
-             f" {windy:.1f} W.")  # fmt: skip
     return [
-        trend(_SOURCE, "20 g, K_P = 10, K_I = 0, 0.01, 0.015: steady error",
-              "30 %, 12 %, below 5 %", "falls with K_I",
-              ", ".join(f"{e:.1f}" for e in error[:3]) + " %",
-              bool(np.all(np.diff(error[:3]) < 0.0)),
-              note="The voltage is always on from an output of 255, the 8 bits of the board, on."
-              " Mean from 10 to 15 s after the step. An integral leaves no error in the end,"
-              " so that the figures depend on that time and on the period of the loop, 10 ms here"
-              " (estimates).", value=error[2]),
-        trend(_SOURCE, "20 g, K_P = 10: larger K_I", "starts to oscillate",
-              f"from one side of the goal to the other by more than {DEVIATION} mm at least 3"
-              " times, less than that at 0.015",
-              f"{integral.swings[3]} times at K_I = {_RINGING}, {integral.swings[2]} at 0.015",
-              bool(integral.swings[3] >= 3 > integral.swings[2]),
-              note=f"{_RINGING}, 33 times the best K_I, is an estimate of \"too large\". The swings"
-              f" die out; the first one takes the TCA to {hottest:.0f} °C.",
-              value=float(integral.swings[3])),
-        trend(_SOURCE, "40 g, K_I = 0.02, K_P = 5, 10, 20: rise", "slow at 5, faster at 20",
-              "the rise gets faster with K_P",
-              ", ".join(f"{t:.2f}" for t in rise) + " s to 32 mm",
-              bool(np.all(np.diff(rise) < 0.0)),
-              note="Until 28 mm the voltage is on all the time at K_P = 10 and 20. The last tenth"
-              " is the integral's, and takes longer at 10 than at 5. At K_P = 10 an error of"
-              f" {late[1]:.1f} % is left after 10 to 15 s (below 5 % reported)."),
-        fitted(_SOURCE, "40 g, K_P = 20: overshoot", "overshoots",
-               f"by {over[2]:.0f} %; at K_P = 10 by {max(over[1], 0.0):.0f} %",
-               f"the {FILTER} samples of the filter; with 10 of them nothing overshoots.",
-               value=over[2]),
-        trend(_SOURCE, "20 g, K_P = 10, K_I = 0.015: blown air", "rejects it, with more power",
-              "regains more than half of what is lost, more than without K_I",
-              f"loses {before[1] - lowest[1]:.0f} mm, regains {back[1]:.0f} %"
-              f" (without K_I {back[0]:.0f} %)",
-              bool(back[1] > 50.0 and back[1] > back[0]), note=works, value=back[1]),
+        finding("steady-error", error[2], bool(np.all(np.diff(error[:3]) < 0.0)), error=error),
+        finding("ringing", float(swings[3]), bool(swings[3] >= 3 > swings[2]), swings=swings,
+                ringing=_RINGING, deviation=DEVIATION, hottest=integral.temperature[:, 3].max()),
+        finding("rise", held=bool(np.all(np.diff(rise) < 0.0)), rise=rise,
+                late=100.0 * (1.0 - proportional.steady / GOAL)),
+        finding("overshoot", over[2], lower=max(over[1], 0.0), filter=FILTER),
+        finding("blown-air", back[1], bool(back[1] > 50.0 and back[1] > back[0]), back=back,
+                loses=before[1] - lowest[1], calm=calm, windy=windy),
     ]  # fmt: skip
 
 
@@ -241,23 +212,11 @@ def demonstration(runs: int = 20) -> list[Finding]:
                 for grams, ohms in true.items() for seed in range(runs))  # fmt: skip
     courses = twice.displacement[twice.time < _HOLD], twice.displacement, once.displacement
     reached = [float(course[-200:].mean()) for course in courses]
-    return [
-        trend("Section 2.3.2", "feels 20 or 40 g by its resistance", "it does, 20 g not always",
-              "right in every run", f"{right} of {2 * runs} runs", right == 2 * runs,
-              note="With the noise and steps of the sensor at 0.8 V; the TCA is cold."),
-        trend("Section 2.3.2", "lifts 20 g twice by 20 mm, 40 g by 40 mm", "it does",
-              "within 5 % of 20, 40 and 40 mm while it holds",
-              ", ".join(f"{r:.1f}" for r in reached) + " mm",
-              all(abs(r / aim - 1.0) < 0.05 for r, aim in zip(reached, (20, 40, 40), strict=True)),
-              note="K_P = 10, K_I = 0.1 (an estimate: with 0.015 it takes longer than the 2 s)."),
-    ]  # fmt: skip
+    near = all(abs(r / aim - 1.0) < 0.05 for r, aim in zip(reached, (20, 40, 40), strict=True))
+    return [finding("feels", held=right == 2 * runs, right=right, runs=2 * runs),
+            finding("lifts", held=near, reached=reached)]  # fmt: skip
 
 
 def finger() -> list[Finding]:
     """The finger needs a body."""
-    return [not_covered(
-        "Section 4.2", "finger of 40 mm: triggered by -0.2 ohm, bends to 60°, rise and error",
-        "1.5 s, within 5 %", "rise and error are those of the bending body and of the silicone that"
-        " warms up around the TCAs; a TCA alone has neither. The controller with two"
-        " proportional gains, 20 and then 3, is in `tca_mj.control`.",
-    )]  # fmt: skip
+    return [finding("finger-control")]

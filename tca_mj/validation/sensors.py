@@ -9,7 +9,7 @@ from tca_mj.checks import Array
 from tca_mj.tca import MODULE_TCAS, Load, LoadedTcas, TcaSpec, WireTable, hanging_length, resistance
 from tca_mj.tca.sensing.sensor import measured
 from tca_mj.tca.sensing.wire import DisplacementFit, fit_displacement, resistance_displacement
-from tca_mj.validation.facts import Finding, check, fitted, trend
+from tca_mj.validation.facts import Finding, finding
 from tca_mj.validation.strokes import heat_up, settled, weight
 
 SENSED = MODULE_TCAS["sensing"]
@@ -18,7 +18,6 @@ WEIGHTS = (10, 20, 30, 40, 50)  # Sun, Section 2.3.1 [g]
 VOLTS = (12.0, 10.0)  # Sun, Section 2.3.1
 Ohms = Callable[[Array, Array], Array]  # of length [m] and temperature [°C]
 _RUNS = 20  # measurements over which an error is averaged
-_LOOK = "Section 2.3.1"
 
 
 def crept(grams: float) -> TcaSpec:
@@ -86,25 +85,9 @@ def findings() -> list[Finding]:
         for grams in (20, 40)
     )
     return [
-        fitted(_LOOK, "cold, pulled by 50 %", "0.55 ohm", f"{ohms[0] - ohms[1]:.2f} ohm",
-               "`TcaSpec.stretch_resistance`.", value=float(ohms[0] - ohms[1])),
-        trend(_LOOK, "heated under 10 to 50 g", "rises as it contracts, monotonic",
-              "rises with every step",
-              ", ".join(f"{curve.ohms[0]:.2f} to {curve.ohms[-1]:.2f}"
-                        for grams, curve in found.items() if grams in (10, 50))
-              + " ohm under 10, 50 g", rising),
-        trend(_LOOK, "cold, pulled by up to 0.5 N", "falls with the force", "falls with every step",
-              f"{falls[0]:.2f} to {falls[-1]:.2f} ohm", bool(np.all(np.diff(falls) < 0.0))),
-        check("Section 2.3.2", "R-D under 10 to 50 g at 12 and 10 V: averaged curve",
-              "almost overlap, misleads by less than 20 % of 40 mm", off, -np.inf, 8.0, "mm",
-              note="At 20 mm. What a load stretches elastically lowers the resistance as it does"
-              " when cold; what has crept does not count. Nothing is fitted, and the law has no"
-              " term of speed."),
-        fitted("Section 2.3.2", "error of the cubic D(R), 20 g", "0.22 mm", f"{light:.2f} mm",
-               "`CurrentSensor.noise`.", value=light),
-        check("Section 2.3.2", "error of the cubic D(R), 40 g", "0.35 mm", heavy, 0.30, 0.40, "mm",
-              digits=2,
-              reason="The noise of the sensor is the only source of error here, and it is that of"
-              " 20 g: the law is a straight line, which the cubic follows exactly. What makes 40 g"
-              " worse is not reported; 1.6 times the noise would do."),
+        finding("stretch-resistance", float(ohms[0] - ohms[1])),
+        finding("heated-resistance", held=rising, light=found[10].ohms[[0, -1]],
+                heavy=found[50].ohms[[0, -1]]),
+        finding("pulled-resistance", held=bool(np.all(np.diff(falls) < 0.0)), falls=falls[[0, -1]]),
+        finding("averaged-curve", off), finding("cubic-20-g", light), finding("cubic-40-g", heavy),
     ]  # fmt: skip

@@ -15,7 +15,7 @@ from tca_mj.checks import Array
 from tca_mj.tca import CATALOGUE, FibreSpec, LoadedTcas, TcaSpec, hanging_length
 from tca_mj.tca.dynamics.loads import GRAVITY, Course, Heating
 from tca_mj.tca.laws.creep import CreepBank, CreepState
-from tca_mj.validation.facts import Finding, check, fitted, not_covered, trend
+from tca_mj.validation.facts import Finding, finding, words
 
 Ends = Literal["free", "locked"]
 
@@ -73,18 +73,11 @@ def heat_up(
 
 def free_strokes() -> list[Finding]:
     """Free strokes of Table 2.1 from the catalogue, and from fibre and mandrel."""
-    contact = 1e3 * CATALOGUE["type-2-180"].minimum_length
-    rows = [check("Table 2.1", "length at which coils touch", "about 70 mm", contact, 69.5, 70.5,
-                  "mm", note="350 mm of thread at the groove of type 0, 11.53°.")]  # fmt: skip
+    rows = [finding("contact-length", 1e3 * CATALOGUE["type-2-180"].minimum_length)]
     for name, (*_, printed) in TYPES.items():
-        stroke = 100.0 * CATALOGUE[name].free_stroke
-        about = "Table 2.1", f"free stroke of {name}, catalogue", f"{printed} %"
-        rows.append(fitted(
-            *about, f"{stroke:.1f} %",
-            "the contact length of type 0 follows from this number: its natural length, 61 mm,"
-            " is below its made length, 70 mm, at which its coils touch already.", value=stroke,
-        ) if name == "type-0-180" else check(
-            *about, stroke, printed - _POINTS, printed + _POINTS, "%"))  # fmt: skip
+        key = "free-stroke-of-type-0" if name == "type-0-180" else "free-stroke"
+        rows.append(finding(key, 100.0 * CATALOGUE[name].free_stroke, name=name, printed=printed,
+                            low=printed - _POINTS, high=printed + _POINTS))  # fmt: skip
     return rows + from_mandrels()
 
 
@@ -106,27 +99,16 @@ def made_from_mandrel(name: str) -> TcaSpec:
 
 def from_mandrels() -> list[Finding]:
     """What annealing keeps of the made length, for types that are coiled in a groove."""
-    kept = {name: 100.0 * made_from_mandrel(name).rest_length / (1e-3 * TYPES[name][2])
-            for name in ("type-1-180", "type-2-180")}  # fmt: skip
-    rows = [
-        fitted("Section 2.2.2", "natural over made length of types 1-180 and 2-180, from mandrels",
-               "92.5 and 80.5 %", " and ".join(f"{share:.1f}" for share in kept.values()) + " %",
-               "how much of the groove's gap is kept at 180 °C was fitted to the natural lengths of"
-               " Table 2.1, which are 93.6 and 81.6 % of the made ones there.",
-               value=kept["type-2-180"]),
-        not_covered("Table 2.1", "free stroke of type-0-180, from its mandrel", "5.7 %",
-                    "it is coiled without a groove, turn on turn, and what annealing keeps is the"
-                    " gap of a groove."),
-    ]  # fmt: skip
+    kept = [100.0 * made_from_mandrel(name).rest_length / (1e-3 * TYPES[name][2])
+            for name in ("type-1-180", "type-2-180")]  # fmt: skip
+    rows = [finding("kept-length", kept[1], kept=kept),
+            finding("free-stroke-of-type-0-from-mandrel")]  # fmt: skip
     for name in ("type-1-200", "type-2-200"):
         by_angle = 1.0 - math.sin(math.radians(11.53)) / math.sin(math.radians(TYPES[name][0]))
         printed, stroke = TYPES[name][4], 100.0 * made_from_mandrel(name).free_stroke
-        rows.append(check(
-            "Table 2.1", f"free stroke of {name}, from its mandrel", f"{printed} %", stroke,
-            printed - _POINTS, printed + _POINTS, "%",
-            note="The groove's pitch follows from the made length, which 200 °C keep: where angles"
-            " and lengths of the table disagree, the lengths are taken. By the angle it is"
-            f" {100.0 * by_angle:.1f} %.",
+        rows.append(finding(
+            "free-stroke-from-mandrel", stroke, name=name, printed=printed,
+            low=printed - _POINTS, high=printed + _POINTS, by_angle=100.0 * by_angle,
         ))  # fmt: skip
     return rows
 
@@ -136,14 +118,10 @@ def contact_stops() -> list[Finding]:
     rows = []
     for name, stop in STOPS.items():
         printed = CONTRACTIONS[name, 0]
-        value = contraction(CATALOGUE[name], 0, 150.0)
         low, high = max(stop, printed) - DEVIATION, min(stop, printed) + DEVIATION
-        rows.append(check(
-            "Section 2.2.1", f"{name}, no load, to 150 °C", f"{printed:g} mm", value, low, high,
-            "mm", note=f"Within {DEVIATION} mm, the published standard deviation, of what is"
-            f" printed and of what the lengths of Table 2.1 leave, {stop} mm. The coils touch"
-            " below 150 °C in both types, so that this tests where they do and nothing else.",
-        ))  # fmt: skip
+        rows.append(finding("contact-stop", contraction(CATALOGUE[name], 0, 150.0), name=name,
+                            printed=printed, low=low, high=high, stop=stop,
+                            deviation=DEVIATION))  # fmt: skip
     return rows
 
 
@@ -242,19 +220,11 @@ def loaded_contractions(*, scanned: bool = False) -> list[Finding]:
     none, one = (hanging_length(tca, 25.0, weight(40)) - tca.rest_length
                  for tca in (CATALOGUE[name] for name in STOPS))  # fmt: skip
     between = 1e3 * float(one - none)  # cold stretch of type 1 less that of type 0 [mm]
-    reason = (
-        "The two types differ by 20 mm in print. In the model type 1 stretches"
-        f" {-between:.1f} mm less than type 0 under 40 g when cold, and its free stroke is 14.5 mm"
-        f" longer: with the coils of both touching they differ by {14.5 + between:.0f} mm, and by"
-        " no more than 14.5 mm however stiff the thread; with neither touching by a few mm, at"
-        " first the other way round. No choice of thread holds both (the table of threads)."
-    )
-    if scanned:
-        reason += f" {_scans()}"
+    scans = f" {_scans()}" if scanned else ""
     return [
-        check("Section 2.2.1", f"{name}, 40 g, to 150 °C", f"{mm:g} mm",
-              contraction(CATALOGUE[name], 40, 150.0), mm - DEVIATION, mm + DEVIATION, "mm",
-              reason=reason)
+        finding("loaded-contraction", contraction(CATALOGUE[name], 40, 150.0), name=name,
+                printed=mm, low=mm - DEVIATION, high=mm + DEVIATION, less=-between,
+                touching=14.5 + between, scans=scans)
         for name, mm in ((name, CONTRACTIONS[name, 40]) for name in STOPS)
     ]  # fmt: skip
 
@@ -264,14 +234,8 @@ def _scans() -> str:
     scan, factors = scan_of_choices(), scan_of_factors()
     best, fitted_best = (" / ".join(f"{mm:.1f}" for mm in each.values[0])
                          for each in (scan, factors))  # fmt: skip
-    return (
-        f"Of {len(scan.choices)} sets of what the source leaves open the best,"
-        f" {scan.choices[0].words}, gives {best} mm for the printed"
-        f" 4 / 20 / 24 / 44 mm, off by up to {scan.errors[0]:.1f} mm. With untwist and moduli"
-        f" scaled at will ({len(factors.choices)} sets) the best, {factors.choices[0].words}, gives"
-        f" {fitted_best} mm: all four at the contact stop, and still off by"
-        f" {factors.errors[0]:.1f} mm, more than the standard deviation of {DEVIATION} mm."
-    )
+    return words("scans", scan=scan, sets=len(scan.choices), best=best, fitted_best=fitted_best,
+                 factors=factors, scaled=len(factors.choices), deviation=DEVIATION)  # fmt: skip
 
 
 def loaded_stroke() -> list[Finding]:
@@ -279,7 +243,6 @@ def loaded_stroke() -> list[Finding]:
     tca, load = CATALOGUE["type-2-200"], weight(10)
     annealed = TYPES["type-2-200"][1]
     cold, data, hot = hanging_length(tca, [25.0, 160.0, annealed], load)
-    touching = 100.0 * (1.0 - tca.minimum_length / float(cold))
 
     def above_contact(temperature: float, grams: float) -> float:
         return float(hanging_length(tca, temperature, weight(grams))) - tca.minimum_length
@@ -287,18 +250,10 @@ def loaded_stroke() -> list[Finding]:
     meets, bare = (brentq(lambda hot, w=grams: above_contact(hot, w), 120.0, 250.0, xtol=0.1)
                    for grams in (10.0, 0.0))  # fmt: skip
     return [
-        check(
-            "Section 2.1.1", "stroke of type-2-200 under 10 g, until its coils touch", "55 %",
-            100.0 * float(1.0 - hot / cold), 50.0, 60.0, "%",
-            note="The stroke is defined up to contact, and no temperature is named; judged is the"
-            f" one at {annealed:.0f} °C, where the TCA was annealed and would lose its shape. Its"
-            f" coils touch at {meets:.0f} °C ({touching:.0f} %), without load, which is the free"
-            f" stroke of 48 %, at {bare:.0f} °C. Both are beyond the data: at 160 °C it is"
-            f" {100.0 * float(1.0 - data / cold):.0f} %.",
-        ),
-        fitted("Section 2.1.1", "force at which type-2-200 breaks", "0.78 N",
-               f"{tca.breaking_force:.2f} N",
-               "it is the catalogue's `breaking_force`.", value=tca.breaking_force),
+        finding("loaded-stroke", 100.0 * float(1.0 - hot / cold), annealed=annealed, meets=meets,
+                touching=100.0 * (1.0 - tca.minimum_length / float(cold)), bare=bare,
+                data=100.0 * float(1.0 - data / cold)),
+        finding("breaking-force", tca.breaking_force),
     ]  # fmt: skip
 
 
@@ -314,9 +269,5 @@ def overlaps(tca: TcaSpec) -> tuple[float, float]:
 def overlap() -> list[Finding]:
     """Below 70 °C the curves of 0, 20 and 40 g nearly overlap."""
     found = {name: overlaps(CATALOGUE[name]) for name in STOPS}
-    return [
-        trend("Section 2.2.1", f"{name}, 0, 20 and 40 g below 70 °C", "curves almost overlap",
-              f"each within {DEVIATION} mm of their mean", f"{early:.1f} mm ({late:.1f} at 150 °C)",
-              early <= DEVIATION, value=early)
-        for name, (early, late) in found.items()
-    ]  # fmt: skip
+    return [finding("overlap", early, early <= DEVIATION, name=name, late=late, deviation=DEVIATION)
+            for name, (early, late) in found.items()]  # fmt: skip

@@ -13,10 +13,9 @@ from tca_mj.tca.catalogue import FREE_STROKE_CREPT
 from tca_mj.tca.dynamics.loads import Heating, Load
 from tca_mj.tca.fibre.boundary import FibreShape, solve_fibre
 from tca_mj.tca.fibre.centreline import CONICAL
-from tca_mj.validation.facts import Finding, check, fitted, trend
+from tca_mj.validation.facts import Finding, finding
 from tca_mj.validation.strokes import heat_up, settled, weight
 
-STATICS = "Section 3.4.4"
 TEMPERATURES = np.linspace(25.0, 160.0, 28)
 # Sun, Section 3.4.4: weights [g] under which the two TCAs were heated.
 CASES = {"free-stroke-made": (2, 30, 60), "self-coiled": (50, 100, 200)}
@@ -61,16 +60,10 @@ def distances(tca: TcaSpec, grams: float, theory: Theory) -> Array:
 def moduli() -> list[Finding]:
     """E and G as measured, and their fall with heat and load."""
     fibre, tca = CATALOGUE["free-stroke"].fibre, CATALOGUE["free-stroke-made"]
-    torsion = load_torsion(tca, 60)
-    fall = 100.0 * (1.0 - float(softening(fibre, 160.0, torsion)))
-    heat = 100.0 * (1.0 - float(softening(fibre, 160.0)))
-    given = f"{1e-9 * fibre.young:g}, {1e-9 * fibre.shear:g}, {1e-9 * fibre.filament_young:g} GPa"
-    return [
-        fitted("Section 3.2.2", "E, G, E_f at 25 °C", "1.2, 0.22, 3.9 GPa", given,
-               "they are the constants of `FibreSpec`."),
-        check("Section 3.2.2", "fall of G at 160 °C under 60 g", "more than 13 %", fall, 13.0,
-              np.inf, "%", note=f"Heat alone takes {heat:.1f} %."),
-    ]  # fmt: skip
+    fall, heat = (100.0 * (1.0 - float(softening(fibre, 160.0, torsion)))
+                  for torsion in (load_torsion(tca, 60), 0.0))  # fmt: skip
+    gpa = [1e-9 * modulus for modulus in (fibre.young, fibre.shear, fibre.filament_young)]
+    return [finding("moduli", gpa=gpa), finding("fall-of-g", fall, heat=heat)]
 
 
 def load_torsion(tca: TcaSpec, grams: float) -> float:
@@ -91,44 +84,23 @@ def spread() -> list[Finding]:
         shown = "; ".join(f"{key} " + ", ".join(f"{error:.1f}" for error in errors)
                           for key, errors in largest.items()) + " %"  # fmt: skip
         cases = f"{name}, " + "/".join(str(grams) for grams in weights) + " g, 25 to 160 °C"
-        rows.append(trend(
-            STATICS, f"{cases}: order of the models", "rod nearest, then Castigliano, then Love",
-            "Castigliano nearer to the rod than Love", shown,
-            all(cst < love for cst, love in zip(*largest.values(), strict=True)), strict=True,
-            note="Largest distance from the rod over its largest contraction; measured curves are"
-            " not available, so that the rod stands for the experiment.",
-        ))  # fmt: skip
         heavy = {key: values[-1] for key, values in found.items()}
-        middle = len(TEMPERATURES) // 2
+        first = len(TEMPERATURES) // 2 + 1
+        warming = "; ".join(f"{key} {values[first]:.1f} to {values[-1]:.1f}"
+                            for key, values in heavy.items())  # fmt: skip
         rows += [
-            trend(STATICS, f"{cases}: growth with load", "errors grow", "both grow with the load",
-                  shown, all(np.all(np.diff(errors) > 0.0) for errors in largest.values()),
-                  strict=True,
-                  reason="Castigliano grows. Under 50 g the turns of Love's coil and of the rod"
-                  " touch, which shortens the rod's contraction that distances are divided by. The"
-                  " contact angle of this TCA is an estimate, close packing at 0.42 mm; at the"
-                  " thickness of 0.34 mm both would grow, but then it would contract by 31 % under"
-                  " 50 g, where 10 to 20 % are reported of self-coiled TCAs."),
-            trend(STATICS, f"{name}, {weights[-1]} g: growth with heat", "errors grow",
-                  "both grow with every step of 5 °C",
-                  "; ".join(f"{key} {values[1 + middle]:.1f} to {values[-1]:.1f}"
-                            for key, values in heavy.items())
-                  + f" % from {TEMPERATURES[middle + 1]:.0f} to 160 °C",
-                  all(np.all(np.diff(values[1:]) > 0.0) for values in heavy.values()),
-                  strict=True),
+            finding("statics-order", cases=cases, shown=shown, held=all(
+                cst < love for cst, love in zip(*largest.values(), strict=True))),
+            finding("statics-load", cases=cases, shown=shown, held=all(
+                np.all(np.diff(errors) > 0.0) for errors in largest.values())),
+            finding("statics-heat", name=name, grams=weights[-1], shown=warming,
+                    start=TEMPERATURES[first], held=all(
+                        np.all(np.diff(values[1:]) > 0.0) for values in heavy.values())),
         ]  # fmt: skip
     made = {theory.name: distances(CATALOGUE["free-stroke-made"], 60, theory)[-1]
             for theory in (CST, PATH, LOVE)}  # fmt: skip
-    band = "The band is around what other implementations of the corrected equations give."
-    rows += [
-        check(STATICS, "free-stroke-made, 60 g, 160 °C: Love over the rod", "up to about 40 %",
-              made[LOVE.name], 30.0, 45.0, "%", note=band),
-        check(STATICS, "free-stroke-made, 60 g, 160 °C: Castigliano over the rod",
-              "between rod and Love", made[CST.name], 20.0, 32.0, "%", note=band),
-        check(STATICS, "free-stroke-made, 60 g, 160 °C: path-following Castigliano over the rod",
-              "between rod and Love", abs(made[PATH.name]), -np.inf, 10.0, "%", note=band),
-    ]  # fmt: skip
-    return rows
+    return [*rows, finding("love", made[LOVE.name]), finding("castigliano", made[CST.name]),
+            finding("castigliano-path", abs(made[PATH.name]))]  # fmt: skip
 
 
 def crept_free_stroke(grams: float) -> TcaSpec:
@@ -208,16 +180,8 @@ def dynamics(dt: float = 0.01) -> list[Finding]:
     hottest = max(float(lift.temperature[-1]) for lift in found.values())
     bare = lifting(30, ROD, "tca")
     ohms, loss = float(bare.resistance(bare.rest())[0]), float(np.ravel(bare.heat.loss)[0])
-    settles = 25.0 + 25.0 / ohms / loss
-    return [trend(
-        "Section 3.4.4", "30 and 50 g lifted at 5 and 6 V: order of the models",
-        "rod within 12 %, then Castigliano, then Love", "Castigliano nearer to the rod than Love",
-        f"{shown} %", all(cst < love for cst, love in errors.values()),
-        note="Largest distance of Castigliano and Love from the rod up to 160 °C; the 12 % refer to"
-        " curves that are not available. 6.7 ohm/dm are counted per length of fibre here: per"
-        f" length of TCA 5 V would settle at {settles:.0f} °C, above the melting point (see the"
-        f" table of heat). After 4 s at 6 V the TCA has {hottest:.0f} °C.",
-    )]  # fmt: skip
+    return [finding("dynamics", held=all(cst < love for cst, love in errors.values()), shown=shown,
+                    settles=25.0 + 25.0 / ohms / loss, hottest=hottest)]  # fmt: skip
 
 
 def heated_cone(temperature: float) -> FibreShape:
@@ -269,28 +233,17 @@ def cone(step: float = 1.0) -> Cone:
 def conical(found: Cone | None = None) -> list[Finding]:
     """Dual-side stroke, coils that pass each other, and no plane."""
     found = cone() if found is None else found
-    source = "Section 3.4.5"
     stroke = 100.0 * (1.0 - found.end / found.end[0])
-    at = int(np.argmin(np.abs(found.temperature - 115.0)))
+    at, middle = (int(np.argmin(np.abs(found.temperature - hot))) for hot in (115.0, 85.0))
     span = found.highest - found.lowest
-    level = float(np.interp(0.0, -found.end, found.temperature))
     ordered = bool(np.all(np.diff(found.rises[1:], axis=1) < 0.0))
-    middle = int(np.argmin(np.abs(found.temperature - 85.0)))
-    turns = ", ".join(f"{rise:.1f}" for rise in found.rises[middle])
-    thick = 2e3 * CONICAL.fibre.radius
+    warm = found.rises[middle]
     return [
-        check(source, "conical TCA: dual-side stroke at 115 °C", "above 100 %", stroke[at], 100.0,
-              np.inf, "%", digits=0),
-        check(source, "conical TCA: free end level with its clamp", "passes it",
-              level, 70.0, 115.0, "°C", digits=0),
-        trend(source, "conical TCA: big coils pass small ones", "big coils pass small ones",
-              "the bigger a turn, the lower its rise, at all temperatures",
-              f"rises at 85 °C: {turns} mm", ordered and found.rises[middle, 0] > 0.0
-              > found.rises[middle, -1], strict=True,
-              note="Turns from the clamp to the free end, smallest first."),
-        check(source, "conical TCA: never all in one plane", "never", float(span.min()), thick,
-              np.inf, "mm", note="Smallest height of the whole fibre; in a plane it would be its"
-              " diameter."),
+        finding("cone-stroke", stroke[at]),
+        finding("cone-level", float(np.interp(0.0, -found.end, found.temperature))),
+        finding("cone-order", held=ordered and warm[0] > 0.0 > warm[-1],
+                turns=", ".join(f"{rise:.1f}" for rise in warm)),
+        finding("cone-plane", float(span.min()), low=2e3 * CONICAL.fibre.radius),
     ]  # fmt: skip
 
 
@@ -306,11 +259,7 @@ def speed(duration: float = 5.0, dt: float = 0.05) -> list[Finding]:
         begin = time.thread_time()
         tcas.simulate(start, heating, dt, round(duration / dt))
         published, seconds = PUBLISHED_SPEED[theory.model], time.thread_time() - begin
-        rows.append(check(
-            "Section 3.4.4", f"dynamics, {theory.name}, 0.05 s steps",
-            f"{published:g} s per simulated second", published * duration / seconds, 1.0, np.inf,
-            "times faster", digits=0,
-            note="On the machine named above; one weight at a time, NumPy alone.",
-        ))  # fmt: skip
+        rows.append(finding("speed", published * duration / seconds, name=theory.name,
+                            published=published))  # fmt: skip
     return rows
 

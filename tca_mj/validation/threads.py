@@ -15,6 +15,7 @@ from tca_mj.tca import CATALOGUE, hanging_length, tension
 from tca_mj.validation import strokes
 from tca_mj.validation.creeping import four_lengths
 from tca_mj.validation.drag import ANNEALED, FRICTION
+from tca_mj.validation.facts import words
 from tca_mj.validation.race import NAMES, run
 from tca_mj.validation.strokes import CONTRACTIONS, DEVIATION, STOPS, THICKNESS, Choice, overlaps
 
@@ -79,11 +80,11 @@ def table() -> str:
     """The table, as Markdown, and what it says."""
     rows = [["*published*", "4, 20", "24, 44", "55", "0.4, 0.4", f"up to {DEVIATION}", "above 0",
              "60", "", ""]]  # fmt: skip
-    for words, thread in THREADS.items():
+    for name, thread in THREADS.items():
         row = facts(thread)
         a, b, c, d = row.contractions
         rows.append([
-            words, f"{a:.1f}, {b:.1f}", f"{c:.1f}, {d:.1f}",
+            name, f"{a:.1f}, {b:.1f}", f"{c:.1f}, {d:.1f}",
             f"{row.stroke:.0f}, {row.annealed:.0f}", f"{row.pull:.2f}, {max(row.end, 0.0):.2f}",
             f"{row.overlap[0]:.1f}, {row.overlap[1]:.1f}", f"{row.temporary:.1f}",
             f"{row.largest:.0f}", f"{sum(row.held)}", "no" if thread.untwist == 1.0 else "yes",
@@ -91,15 +92,4 @@ def table() -> str:
     heads = ["thread", "0 g, types 0, 1 [mm]", "40 g [mm]", "55 % under 10 g [%]",
              "0.4 N, start and end [N]", "below 70 °C [mm]", "l4 - l2 [mm]", "1 A, 2 s [mm]",
              "held of 11", "fitted"]  # fmt: skip
-    return pages.page(
-        "Chapters 2 and 3 twist the same thread under the same weight. One thread has the EA, EI"
-        " and GJ that were measured in Chapter 3, two threads take its moduli on the thickness of"
-        " 0.34 mm. Strokes and pull are those of type 2-200 (10 g, to 160 and 200 °C; at the"
-        " natural length at 160 °C and at the end of the free stroke at 200 °C), the temporary"
-        " length is by how much l4 exceeds l2 with ends free to spin. The loss to air is that in"
-        " use, which was fitted with one thread.",
-        pages.table(heads, rows),
-        "One thread holds more than two, with nothing fitted. A larger untwist (1.6 times, as the"
-        " self-coiled TCA has it) would hold the drag over the whole stroke and loses as much"
-        " elsewhere, so that it stays at 1.",
-    )
+    return pages.page(words("thread-choices"), pages.table(heads, rows), words("thread-result"))
