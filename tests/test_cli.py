@@ -103,7 +103,7 @@ def test_a_wrong_command_returns_2_and_says_why(
     assert named in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("command", [[], ["demo"], ["view"], ["list"], ["bench"]])
+@pytest.mark.parametrize("command", [[], ["demo"], ["export"], ["view"], ["list"], ["bench"]])
 def test_help_has_examples(command: list[str], capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as ended:
         cli.main([*command, "--help"])

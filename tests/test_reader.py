@@ -6,6 +6,7 @@ import math
 import numpy as np
 import pytest
 
+from tca_mj import cli
 from tca_mj.modules.bending import bending_module
 from tca_mj.record import Recorder
 from tca_mj.record.reader import read, write_csv
@@ -67,3 +68,13 @@ def test_of_a_recording_that_was_cut_within_a_chunk_it_is_said_how_to_mend_it(re
     (tmp_path / "cut.rrd").write_bytes(whole[: round(0.8 * len(whole))])
     with pytest.raises(ValueError, match="rerun rrd merge"):
         read(tmp_path / "cut.rrd")
+
+
+def test_the_command_writes_the_table_beside_the_recording(recorded, tmp_path, capsys):
+    path, sim, seen = recorded
+    (tmp_path / "copy.rrd").write_bytes(path.read_bytes())
+    assert cli.main(["export", str(tmp_path / "copy.rrd")]) == 0
+    assert f"{tmp_path / 'copy.csv'}: " in capsys.readouterr().out
+    assert len((tmp_path / "copy.csv").read_text(encoding="utf-8").splitlines()) == len(seen) + 1
+    assert cli.main(["export", str(tmp_path / "nothing.rrd")]) == 2
+    assert "there is no recording" in capsys.readouterr().err

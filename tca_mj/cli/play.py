@@ -1,4 +1,4 @@
-"""To look at: ``demo`` records an episode, ``list`` names the tasks, ``view`` opens a window."""
+"""To look at: ``demo`` records, ``export`` reads back, ``list`` names tasks, ``view`` shows them."""
 
 import argparse
 import sys
@@ -22,7 +22,7 @@ Without a screen you can
 
 
 def add_commands(commands: Commands) -> None:
-    """Adds demo, list and view."""
+    """Adds demo, export, list and view."""
     demo = add_command(commands, "demo", _demo, help="run a scripted demo and record it")
     add(demo, "name", "which demo", nargs="?", choices=list(DEMOS))
     add(demo, "--policy", f"{', '.join(POLICIES)}, a shipped one, a file or a run")
@@ -30,6 +30,10 @@ def add_commands(commands: Commands) -> None:
     add(demo, "--out", "folder; default runs/demo/TASK")
     add(demo, "--video", "make the film, which takes most of the time",
         action=argparse.BooleanOptionalAction, default=True)  # fmt: skip
+
+    export = add_command(commands, "export", _export, help="write a recording's curves as a table")
+    add(export, "recording", "a .rrd file", type=Path)
+    add(export, "--csv", "file to write; default: beside the recording", type=Path)
 
     tasks = add_command(commands, "list", _list, help="list the tasks, with their spaces")
     add(tasks, "task", "only these, or module:id", nargs="*")
@@ -100,6 +104,23 @@ def speed_table(summary: dict[str, Any]) -> str:
         for phase, row in zip(summary["phases"], summary["speeds"], strict=True)
     ]  # fmt: skip
     return "\n".join(table(["stage", "time", "distance", "speed", "published"], rows))
+
+
+def _export(arguments: argparse.Namespace) -> int:
+    """Writes the curves of a recording as one table: a row for every time, a column with its unit
+    for every curve. In Python, `tca_mj.record.reader.read` gives the same as arrays.
+
+    examples:
+      tca-mj export runs/demo/{demo}/rollout.rrd
+      tca-mj export rollout.rrd --csv curves.csv
+    """
+    from tca_mj.record.reader import read, write_csv
+
+    path = arguments.csv or arguments.recording.with_suffix(".csv")
+    recording = read(arguments.recording)
+    write_csv(recording, path)
+    print(f"{path}: {len(recording.curves)} curves")
+    return 0
 
 
 def _list(arguments: argparse.Namespace) -> int:
