@@ -1,4 +1,4 @@
-"""To look at: ``demo`` records, ``export`` reads back, ``list`` names tasks, ``view`` shows them."""
+"""To look at: ``demo`` records, ``export`` reads back, ``list`` names and ``view`` shows tasks."""
 
 import argparse
 import sys
