@@ -26,7 +26,7 @@ from tca_mj.model.smooth import SmoothBody, Strained
 from tca_mj.model.spines import Spines
 from tca_mj.sim import DIVERGENCE, Drive, Simulation, SimulationDiverged
 from tca_mj.tca import CoilSolveError, Pull, TcaBank, TcaMelted, TcaState
-from tca_mj.tca.arrays import row, stacked
+from tca_mj.tca.arrays import stacked, unstacked
 
 Array = NDArray[np.float64]
 
@@ -73,6 +73,8 @@ class SimulationBatch:
             self.physics.bind(name) for name in ("ten_length", "ten_J")
         )
         self._body = SmoothBody.batch([sim.body for sim in self.sims])
+        self._parts: list[Any] = []
+        self._bank: Any = None
 
     def step(
         self, drives: Sequence[Drive | None], duration: float
@@ -116,6 +118,15 @@ class SimulationBatch:
                 errors[i] = error
         return errors
 
+    def _bank_of(self, sims: Sequence[Simulation]) -> Any:
+        """The TCAs of simulations as one bank; made anew only if a heat or a supply is another."""
+        parts = [*(sim.bank.heat for sim in sims), sims[0].bank.supply]
+        same = len(parts) == len(self._parts)
+        if not (same and all(a is b for a, b in zip(parts, self._parts, strict=True))):
+            self._parts, self._bank = parts, copy(sims[0].bank)
+            self._bank.heat = stacked(parts[:-1])
+        return self._bank
+
     def _run(self, ids: NDArray[np.int64], inputs: Sequence[Inputs], updates: int) -> Sequence[int]:
         """The ordinary course of ``step`` for the simulations ``ids``.
 
@@ -123,7 +134,7 @@ class SimulationBatch:
             Those for which it is not the right one, and which are as they were before.
         """
         sims, batch = [self.sims[i] for i in ids], self.physics
-        every = _Every(self._body, sims, inputs)
+        every = _Every(self._body, self._bank_of(sims), sims, inputs)
         which = None if len(ids) == len(self.sims) else ids
         rows: Any = slice(None) if which is None else ids
         for i, sim in zip(ids, sims, strict=True):
@@ -171,6 +182,7 @@ class _Every:
     def __init__(
         self,
         body: SmoothBody,
+        bank: TcaBank,
         sims: Sequence[Simulation],
         inputs: Sequence[Inputs],
     ) -> None:
@@ -178,8 +190,7 @@ class _Every:
         self.sims = sims
         self.inputs: Inputs = stacked(inputs)
         self.period, self.steadiness = first.tca_period, first.steadiness
-        self.bank: TcaBank = copy(first.bank)
-        self.bank.heat = stacked([sim.bank.heat for sim in sims])
+        self.bank = bank
         self.tca: TcaState = stacked([sim.tca for sim in sims])
         self.gain = np.array([[sim.gain] for sim in sims])
         self.offset = np.stack([sim.length_offset for sim in sims])
@@ -189,7 +200,8 @@ class _Every:
         self.pull: Pull
         self.power: Array
         self.strained: Strained
-        self.now: tuple[Array, Strained]
+        self.now: tuple[list[Array], list[Strained]]
+        self.ended: list[Any]
 
     def advance(self, qpos: Array) -> NDArray[np.bool_]:
         """Heats TCAs and spines for a period; where a length has no law, shape (m,)."""
@@ -216,20 +228,19 @@ class _Every:
             tendon_length=tendon_length.take(self.sims[0].tendon, axis=-1),
             tendon_slope=tendon_slope, steadiness=self.steadiness,
         )  # fmt: skip
+        each = unstacked(writes)
         for k in which:
-            self.sims[k].take(row(writes, k))
+            self.sims[k].take(each[k])
 
     def settle(self, qpos: Array) -> None:
         """Computes the bodies where they are now, which tasks ask for next."""
-        self.now = qpos.copy(), self.body.at(qpos)
+        self.now = list(qpos.copy()), unstacked(self.body.at(qpos))
+        self.ended = unstacked((self.tca, self.pull, self.strained, self.power.copy()))
 
     def give_back(self, k: int) -> None:
         """Makes simulation ``k`` what a step of its own would have made of it."""
-        sim, pull = self.sims[k], self.pull
-        sim.power = self.power[k].copy()
-        sim.tca = row(self.tca, k)
-        sim.pull = Pull(pull.tension[k], pull.stiffness[k], pull.length[k])
-        sim.strained = self.strained[k]
+        sim = self.sims[k]
+        sim.tca, sim.pull, sim.strained, sim.power = self.ended[k]
         self.spines.give_back(k, sim.spines)
         qpos, strained = self.now
         sim.body.keep(qpos[k], strained[k])

@@ -29,7 +29,6 @@ from tca_mj.checks import Array
 from tca_mj.model.chain import MOTIONS, Chain, Motion
 from tca_mj.model.curves import Curves, rows, summed
 from tca_mj.model.tendon import Crossing, RoutedTca
-from tca_mj.tca.arrays import row
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -54,10 +53,6 @@ class Strained:
     sine: Array
     cosine: Array
     cotangent: Array
-
-    def __getitem__(self, i: int) -> "Strained":
-        """Body ``i`` of a batch."""
-        return row(self, i)
 
 
 class SmoothBody:

@@ -38,6 +38,18 @@ def row(values: Value, i: int) -> Value:
     return _mapped(lambda each: each[i], values)
 
 
+def unstacked(values: Value) -> list[Value]:
+    """All rows of what ``stacked`` has made one."""
+    every: Any = values
+    if isinstance(every, np.ndarray):
+        return list(every)
+    if isinstance(every, tuple):
+        return list(zip(*map(unstacked, every), strict=True))  # type: ignore[arg-type]
+    kind: Any = type(every)
+    parts = zip(*[unstacked(getattr(every, name)) for name in _names(kind)], strict=True)
+    return [kind(*each) for each in parts]
+
+
 def _mapped(function: Callable[..., Any], *values: Any) -> Any:
     """``function`` of the arrays that stand at the same place in each of the values."""
     first = values[0]
