@@ -67,6 +67,13 @@ def test_it_is_learned_and_what_was_learned_acts(tmp_path, capsys):
     assert "return" in capsys.readouterr().out
 
 
+def test_it_can_be_viewed_where_there_is_a_screen(monkeypatch, capsys):
+    for name in ("DISPLAY", "WAYLAND_DISPLAY"):
+        monkeypatch.delenv(name, raising=False)
+    assert cli.main(["view", NOD]) == 2
+    assert "no screen" in capsys.readouterr().err
+
+
 def test_it_is_swept_and_timed():
     sweep = Sweep(evaluation=Evaluation(task=NOD), axes={"design.length": (0.05, 0.06)})
     lengths = [trial.evaluation(Path()).make().unwrapped.sim.model for trial in sweep.trials()]

@@ -93,3 +93,22 @@ def test_a_learner_learns_from_it_normalised():
         assert learner.ep_info_buffer and learner.ep_info_buffer[0]["l"] <= 20
         policies.append(learner.policy.state_dict())
     assert all((policies[0][key] == policies[1][key]).all() for key in policies[0])
+
+
+def test_scaled_observations_are_those_of_the_table():
+    """Also the last one of an episode, and at another control period."""
+    made = [TaskVecEnv.make("TCA/BendReach-v0", 2, scaled=scaled, control_period=0.2,
+                            max_episode_steps=2) for scaled in (False, True)]  # fmt: skip
+    table = made[0].tasks.envs[0].observation
+    for envs in made:
+        envs.seed(3)
+    plain, scaled = (envs.reset() for envs in made)
+    assert np.array_equal(table.scaled(plain), scaled) and scaled[0] in made[1].observation_space
+    for _ in range(2):
+        actions = np.zeros((2, *made[0].action_space.shape), np.float32)
+        (plain, *_, done, infos), (scaled, *_, others) = (envs.step(actions) for envs in made)
+        assert np.array_equal(table.scaled(plain), scaled)
+    assert done.all()
+    for info, other in zip(infos, others, strict=True):
+        last = info["terminal_observation"]
+        assert np.array_equal(table.scaled(last), other["terminal_observation"])

@@ -17,8 +17,8 @@ from tca_mj.registry import episode_steps, find_task, task_class
 class TaskVecEnv(VecEnv):
     """Tasks that are stepped together, as a ``VecEnv``.
 
-        env = TaskVecEnv.make("TCA/TetrapodWalk-v0", 8, num_threads=2)
-        model = PPO("MlpPolicy", VecNormalize(VecMonitor(env)))
+        env = TaskVecEnv.make("TCA/TetrapodWalk-v0", 8, scaled=True, control_period=0.5)
+        model = SAC("MlpPolicy", env)
 
     It is, bit for bit, ``DummyVecEnv`` over the single tasks: an episode that is over is followed
     by the next one in the same step, with the last observation as ``terminal_observation`` in its
@@ -32,19 +32,30 @@ class TaskVecEnv(VecEnv):
         tasks: The vector environment.
     """
 
-    def __init__(self, tasks: TaskVector) -> None:
-        """Takes a vector environment, whose own autoreset is not used."""
+    def __init__(self, tasks: TaskVector, *, scaled: bool = False) -> None:
+        """Takes a vector environment, whose own autoreset is not used.
+
+        Args:
+            tasks: The vector environment.
+            scaled: Whether observations come as ``ScaledObservation`` makes them.
+        """
         self.tasks = tasks
+        table = tasks.envs[0].observation
+        self._seen = table.scaled if scaled else np.asarray
         self._actions = np.zeros(tasks.action_space.shape or (), dtype=np.float32)
-        super().__init__(tasks.num_envs, tasks.single_observation_space, tasks.single_action_space)
+        space = table.scaled_space if scaled else tasks.single_observation_space
+        super().__init__(tasks.num_envs, space, tasks.single_action_space)
 
     @classmethod
-    def make(cls, id: str, num_envs: int, **kwargs: Any) -> "TaskVecEnv":
+    def make(
+        cls, id: str, num_envs: int, *, scaled: bool = False, **kwargs: Any
+    ) -> "TaskVecEnv":
         """Makes the vector environment, too.
 
         Args:
             id: Gymnasium id of a task, or ``module:id``.
             num_envs: Number of tasks.
+            scaled: As for the class.
             **kwargs: Other arguments of ``TaskVector`` and of the task.
 
         Raises:
@@ -52,7 +63,8 @@ class TaskVecEnv(VecEnv):
         """
         limit = kwargs.pop("max_episode_steps", episode_steps(id, kwargs.get("control_period")))
         task, given = task_class(id), {**find_task(id).kwargs, **kwargs}
-        return cls(TaskVector(task, num_envs=num_envs, max_episode_steps=limit, **given))
+        tasks = TaskVector(task, num_envs=num_envs, max_episode_steps=limit, **given)
+        return cls(tasks, scaled=scaled)
 
     def reset(self) -> NDArray[np.float32]:
         """Begins new episodes with the seeds and options that were set for this once."""
@@ -63,7 +75,7 @@ class TaskVecEnv(VecEnv):
         self.reset_infos = [info for _, info in begun]
         self._reset_seeds()
         self._reset_options()
-        return np.stack([observation for observation, _ in begun])
+        return self._seen(np.stack([observation for observation, _ in begun]))
 
     def step_async(self, actions: NDArray[np.float32]) -> None:
         """Keeps the actions for ``step_wait``."""
@@ -79,11 +91,11 @@ class TaskVecEnv(VecEnv):
             dones[i] = terminated or truncated
             info["TimeLimit.truncated"] = truncated and not terminated
             if dones[i]:
-                info["terminal_observation"] = observation
+                info["terminal_observation"] = self._seen(observation)
                 observation, self.reset_infos[i] = self.tasks.restart(i)
             observations.append(observation)
             infos.append(info)
-        return np.stack(observations), rewards, dones, infos
+        return self._seen(np.stack(observations)), rewards, dones, infos
 
     def close(self) -> None:
         """Closes the tasks."""
