@@ -240,13 +240,13 @@ class SimulatedTask(gym.Env[Observation, Action], ABC):
         self._used = 0.0
         own, asked = type(self).control_period, control_period
         self.control_period = own if asked is None else number("control_period", asked, above=0.0)
-        self.interval = own if _divides(own, self.control_period) else sim.tca_period
-        if not _divides(self.interval, self.control_period):
+        self.interval = own if _times(own, self.control_period) else sim.tca_period
+        self.repeats = _times(self.interval, self.control_period)
+        if not self.repeats:
             raise ValueError(
                 f"control_period must be a multiple of {sim.tca_period} s, the time between two"
                 f" updates of the TCAs, got {asked}"
             )
-        self.repeats = round(self.control_period / self.interval)
         self.share = self.interval / own  # of a price per step that each judgement takes
         self.metadata = {**self.metadata, "render_fps": max(1, round(1.0 / self.control_period))}
         if heating == "temperature":
@@ -556,17 +556,17 @@ def parts(name: str, whole: float, part: float, *, of: int = 1) -> int:
     Raises:
         ValueError: If it is no such number; ``name`` is what ``part`` is called.
     """
-    count = round(whole / part) if np.isfinite(part) and part > 0.0 else 0
-    if count < 1 or abs(count * part - whole) > 1e-9 or count % of:
+    count = _times(part, whole)
+    if not count or count % of:
         number = f"multiple of {of}" if of > 1 else "whole number"
         raise ValueError(f"{name} must be {whole} s over a {number}, got {part}")
     return count
 
 
-def _divides(part: float, whole: float) -> bool:
-    """Whether a time is a whole number of others."""
-    count = round(whole / part)
-    return count >= 1 and abs(count * part - whole) < 1e-9
+def _times(part: float, whole: float) -> int:
+    """How many times a time makes up another; 0 if that is no whole number."""
+    count = round(whole / part) if np.isfinite(part) and part > 0.0 else 0
+    return count if abs(count * part - whole) < 1e-9 else 0
 
 
 def broken_off(error: SimulationDiverged | None) -> str | None:

@@ -66,8 +66,9 @@ TASKS = {
     "shimmy": GaitTask(bend=math.radians(215.0), speed=0.75e-3, beam=0.12, yaw_range=0.005),
 }
 
-# Updates of the TCAs in a control step, at least. With a single one the scripted walk is 1.4 %
-# faster, with one in every physics step 0.2 % slower or less: scripts/tetrapod_contacts.py.
+# Updates of the TCAs in a control step, at least. With one in every physics step the searched walk
+# is 1.0 % slower, the other gaits 0.3 % or less; with a single one the scripted walk is 1.2 %
+# faster: scripts/tetrapod_contacts.py.
 _UPDATES = 2
 _SETTLING = 0.5  # time in which the robot comes to rest after it is put down [s]
 _UPRIGHT = 0.5  # cosine of the tilt from which on it has fallen over

@@ -123,7 +123,7 @@ def held(part: Part, temperature: Sequence[float]) -> Simulation:
     for joint in part.spec.joints:  # of no influence on where it comes to rest
         joint.damping = 20.0 * np.asarray(joint.damping)
     sim = Simulation(part, timestep=1e-2)
-    if sim.rest(temperature) > 3e-5:
+    if sim.rest(temperature, quiet=2e-6) > 2e-6:
         raise RuntimeError(f"at {temperature} °C the part does not come to rest")
     return sim
 

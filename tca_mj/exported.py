@@ -12,11 +12,13 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike
 
+from tca_mj.checks import floats
 from tca_mj.files import write_whole
 from tca_mj.model.part import Part
-from tca_mj.sim import Simulation
+from tca_mj.sim import Simulation, SimulationDiverged
 
 REST = "rest"  # the keyframe of the rest that was found
+_STILL = 1e-2  # velocity with which MuJoCo's solver lets a joint creep at rest [rad/s, m/s]
 
 
 def export(
@@ -24,7 +26,8 @@ def export(
 ) -> str:
     """Writes a part as MJCF whose TCAs pull with their law frozen at temperatures.
 
-    The part is led to rest at them, from its unloaded shape. The file has that rest as the keyframe
+    The part is led to rest at them, from its unloaded shape, a part on a free joint without weight,
+    which the file has again. The file has that rest as the keyframe
     ``rest``; from any other place near it MuJoCo comes there by itself.
 
     Args:
@@ -43,8 +46,14 @@ def export(
     own = Part(part.spec.copy(), part.tcas, dict(part.sites), part.spines)
     sim = Simulation(own)
     ambient = np.broadcast_to(sim.bank.heat.ambient, sim.n)
-    asked = ambient if temperatures is None else np.asarray(temperatures, dtype=np.float64)
-    sim.rest(np.broadcast_to(asked, (sim.n,)) if asked.ndim == 0 else asked)
+    if (sim.model.jnt_type == int(mujoco.mjtJoint.mjJNT_FREE)).any():
+        sim.model.opt.gravity[:] = 0.0  # nothing holds it: its shape as it floats
+    left = sim.rest(ambient if temperatures is None else floats("temperatures", temperatures))
+    if left > _STILL:
+        raise SimulationDiverged(
+            f"the part does not come to rest at temperatures {temperatures!r}: a joint still moves at"
+            f" {left:.3g} rad/s or m/s"
+        )
     return frozen(sim, own.spec, path)
 
 

@@ -34,6 +34,8 @@ from tca_mj.tca import (
     TcaState,
 )
 
+_SLIDE = int(mujoco.mjtJoint.mjJNT_SLIDE)
+
 # Warnings after which MuJoCo has reset the state by itself.
 DIVERGENCE = {
     int(warning): str(warning).rsplit("_", 1)[-1]
@@ -320,12 +322,14 @@ class Simulation:
             )  # fmt: skip
         if kind == "motor":
             data, ids = self.data, [self.model.actuator(name).id for name in self.motors]
+            slides = self.model.jnt_type[self.model.actuator_trnid[ids, 0]] == _SLIDE
+            place, load = ("m", "N") if slides.all() else ("m or rad", "N or N m")
             return Group(
                 kind=kind, names=self.motors, channels={"ctrl": "-"},
                 signals={
-                    "position": Signal("m or rad", data.actuator_length[ids]),
-                    "velocity": Signal("m/s or rad/s", data.actuator_velocity[ids]),
-                    "force": Signal("N or N m", data.actuator_force[ids]),
+                    "position": Signal(place, data.actuator_length[ids]),
+                    "velocity": Signal(f"({place})/s", data.actuator_velocity[ids]),
+                    "force": Signal(load, data.actuator_force[ids]),
                 },
             )  # fmt: skip
         return muscle_group(

@@ -268,7 +268,7 @@ def check_control_period(id: str) -> None:
 
 
 def check_heat(id: str) -> None:
-    """Whatever temperatures are asked for, no TCA gets too hot or torn, nor is anything charged."""
+    """Whatever temperatures are asked for, no TCA gets too hot or torn."""
     task, random = _task(id), np.random.default_rng(5)
     task.reset(seed=5)
     for number in range(200):

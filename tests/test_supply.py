@@ -9,7 +9,7 @@ import pytest
 from tca_mj.batch import SimulationBatch
 from tca_mj.modules.bending import bending_module
 from tca_mj.sim import Drive, Simulation
-from tca_mj.tca import CATALOGUE, Supply, TcaBank, Thermostat
+from tca_mj.tca import CATALOGUE, HeatSpec, Supply, TcaBank, Thermostat
 from tca_mj.tca.spec import heat_of
 
 SPECS = [CATALOGUE["free-stroke"], CATALOGUE["type-2-180"], CATALOGUE["self-coiled"]]
@@ -149,3 +149,16 @@ def test_impossible_supplies_are_refused(change, message):
         Supply(**change)
     with pytest.raises(ValueError, match=message):
         replace(Supply(), **change)
+
+
+def test_supplies_are_alike_number_by_number():
+    """Also in the last digit of a thermostat's constants."""
+    def made(loss):
+        heat = HeatSpec(capacity=np.full(3, 0.2), loss=np.array([0.1, 0.1, loss]))
+        return Supply(quantity="temperature", max_power=2.0,
+                      thermostat=Thermostat(heat=heat, max_power=2.0))  # fmt: skip
+
+    assert made(0.1).like(made(0.1))
+    assert not made(0.1).like(made(0.1 + 1e-15))
+    assert Supply().like(Supply()) and not Supply().like(Supply(max_power=1.0))
+    assert not Supply().like(Supply(quantity="voltage"))

@@ -7,8 +7,8 @@ for a temperature: what the heat loss takes, and what brings the TCA there withi
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Literal
+from dataclasses import dataclass, fields, is_dataclass
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -137,6 +137,11 @@ class Supply(Checked):
 
     def like(self, other: "Supply") -> bool:
         """Whether another supply does the same."""
-        same = self.quantity == other.quantity and repr(self.thermostat) == repr(other.thermostat)
-        limits = ("max_power", "max_voltage", "max_current")
-        return same and all(np.array_equal(getattr(self, m), getattr(other, m)) for m in limits)
+        return _equal(self, other)
+
+
+def _equal(one: Any, other: Any) -> bool:
+    """Whether two values are, number by number, the same; dataclasses by their fields."""
+    if type(one) is type(other) and is_dataclass(one):
+        return all(_equal(getattr(one, f.name), getattr(other, f.name)) for f in fields(one))
+    return bool(np.array_equal(one, other))
