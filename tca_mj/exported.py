@@ -51,8 +51,8 @@ def export(
     left = sim.rest(ambient if temperatures is None else floats("temperatures", temperatures))
     if left > _STILL:
         raise SimulationDiverged(
-            f"the part does not come to rest at temperatures {temperatures!r}: a joint still moves at"
-            f" {left:.3g} rad/s or m/s"
+            f"the part does not come to rest at temperatures {temperatures!r}: a joint still moves"
+            f" at {left:.3g} rad/s or m/s"
         )
     return frozen(sim, own.spec, path)
 
