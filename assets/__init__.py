@@ -2,6 +2,8 @@
 
 from pathlib import Path
 
+__all__ = ["mjcf"]
+
 _MJCF = Path(__file__).resolve().parent / "mjcf"
 
 

@@ -30,6 +30,7 @@ LAYER_OF = {
     "quadrature": "door",
     "machine": "door",
     "pages": "door",
+    "lazy": "door",
     "bench": "agents",
     "validation": "agents",
     "certify": "agents",

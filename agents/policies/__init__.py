@@ -3,6 +3,6 @@
 ``gait`` and ``network`` act, ``files`` keeps them, ``actors`` finds them by name.
 """
 
-from tca_mj.agents.policies.files import Origin, Policy, SavedPolicy, load_policy, shipped
+from tca_mj.lazy import offer
 
-__all__ = ["Origin", "Policy", "SavedPolicy", "load_policy", "shipped"]
+__getattr__, __dir__, __all__ = offer(__name__, __file__)

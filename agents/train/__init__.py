@@ -1,1 +1,8 @@
-"""What makes policies: ``search`` over the figures of a gait, ``deep`` reinforcement learning."""
+"""What makes policies: ``search`` over the figures of a gait, ``deep`` reinforcement learning.
+
+``from tca_mj.agents.train.search import search``; the function has the name of its file.
+"""
+
+from tca_mj.lazy import offer
+
+__getattr__, __dir__, __all__ = offer(__name__, __file__)

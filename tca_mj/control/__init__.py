@@ -1,19 +1,5 @@
 """Controllers: what turns an error into a voltage or a power, n actuators at a time."""
 
-from tca_mj.control.gait import Gait
-from tca_mj.control.morph import (
-    ClosedLoop,
-    Command,
-    Measurement,
-    MorphSequence,
-    MorphState,
-    OpenLoop,
-    Phase,
-)
-from tca_mj.control.pi import PiSpec, PiState, pi_rest, pi_step
-from tca_mj.tca.supply import Thermostat
+from tca_mj.lazy import offer
 
-__all__ = [
-    "ClosedLoop", "Command", "Gait", "Measurement", "MorphSequence", "MorphState", "OpenLoop",
-    "Phase", "PiSpec", "PiState", "Thermostat", "pi_rest", "pi_step",
-]  # fmt: skip
+__getattr__, __dir__, __all__ = offer(__name__, __file__)

@@ -1,5 +1,5 @@
 """From beams and routes to MuJoCo: chains of links, tendons, scenes."""
 
-from tca_mj.model.at_rest import NotSettledError, settle
+from tca_mj.lazy import offer
 
-__all__ = ["NotSettledError", "settle"]
+__getattr__, __dir__, __all__ = offer(__name__, __file__)

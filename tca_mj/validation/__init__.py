@@ -1,6 +1,5 @@
 """Published facts about TCAs against what the models here give, recomputed and judged."""
 
-from tca_mj.validation.facts import Finding, Verdict, table
-from tca_mj.validation.report import validate_tca
+from tca_mj.lazy import offer
 
-__all__ = ["Finding", "Verdict", "table", "validate_tca"]
+__getattr__, __dir__, __all__ = offer(__name__, __file__)

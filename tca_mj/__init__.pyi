@@ -1,0 +1,41 @@
+from tca_mj.actuation import Group, MixedBank, MixedState, Muscle, MuscleBank
+from tca_mj.batch import SimulationBatch
+from tca_mj.exported import export, frozen
+from tca_mj.model.build import add_tca, stage
+from tca_mj.model.chain import Chain, add_chain
+from tca_mj.model.part import Part, new_spec
+from tca_mj.model.scene import scene
+from tca_mj.model.tendon import RoutedTca
+from tca_mj.modules.bending import BendingSpec, bending_module
+from tca_mj.modules.continuum_leg import LegSpec, continuum_leg
+from tca_mj.modules.finger import FingerPairSpec, finger_pair
+from tca_mj.modules.morphing import MorphingSpec, morphing_module
+from tca_mj.modules.twisting import TwistingSpec, twisting_module
+from tca_mj.record.film import Film
+from tca_mj.record.recorder import Recorder
+from tca_mj.registry import TASKS, Task, episode_steps, find_task, make, register, task_class
+from tca_mj.robots.arm import ArmSpec, arm
+from tca_mj.robots.tetrapod import TetrapodSpec, rigid_tetrapod, tetrapod
+from tca_mj.rod.beam import BeamSpec, Outline
+from tca_mj.routes import Helix, Route, UTurn, leg_length, parallel
+from tca_mj.sim import Drive, Simulation, SimulationDiverged, SimulationOverheated
+from tca_mj.state import SimulationState, get_state, set_state
+from tca_mj.tca.bank import TcaBank
+from tca_mj.tca.catalogue import CATALOGUE
+from tca_mj.tca.spec import FibreSpec, TcaSpec
+from tca_mj.tca.supply import Supply, Thermostat
+from tca_mj.variation import Nominal, Variation
+
+__version__: str
+__all__ = [
+    "ArmSpec", "BeamSpec", "BendingSpec", "CATALOGUE", "Chain", "Drive", "FibreSpec", "Film",
+    "FingerPairSpec", "Group", "Helix", "LegSpec", "MixedBank", "MixedState", "MorphingSpec",
+    "Muscle", "MuscleBank", "Nominal", "Outline", "Part", "Recorder", "Route", "RoutedTca",
+    "Simulation", "SimulationBatch", "SimulationDiverged", "SimulationOverheated",
+    "SimulationState", "Supply", "TASKS", "Task", "TcaBank", "TcaSpec", "TetrapodSpec",
+    "Thermostat", "TwistingSpec", "UTurn", "Variation", "add_chain", "add_tca", "arm",
+    "bending_module", "continuum_leg", "episode_steps", "export", "find_task", "finger_pair",
+    "frozen", "get_state", "leg_length", "make", "morphing_module", "new_spec", "parallel",
+    "register", "rigid_tetrapod", "scene", "set_state", "stage", "task_class", "tetrapod",
+    "twisting_module",
+]  # fmt: skip

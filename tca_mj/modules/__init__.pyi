@@ -1,0 +1,18 @@
+from tca_mj.modules.bending import (
+    SILICONE_SHEAR,
+    SILICONE_YOUNG,
+    BendingSpec,
+    bending_module,
+    silicone_cylinder,
+    straight_module,
+)
+from tca_mj.modules.continuum_leg import LegSpec
+from tca_mj.modules.finger import FingerPairSpec, finger_pair
+from tca_mj.modules.morphing import MorphingSpec, morphing_module
+from tca_mj.modules.twisting import TwistingSpec, twisting_module
+
+__all__ = [
+    "BendingSpec", "FingerPairSpec", "LegSpec", "MorphingSpec", "SILICONE_SHEAR", "SILICONE_YOUNG",
+    "TwistingSpec", "bending_module", "finger_pair", "morphing_module", "silicone_cylinder",
+    "straight_module", "twisting_module",
+]  # fmt: skip

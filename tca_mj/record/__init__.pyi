@@ -1,0 +1,16 @@
+from tca_mj.record.film import Film
+from tca_mj.record.layout import QUANTITIES
+from tca_mj.record.plots import rollout_plot, series_colours, temperature_colour
+from tca_mj.record.recorder import Recorded, Recorder
+from tca_mj.record.render import (
+    Offscreen,
+    RenderingUnavailable,
+    Watched,
+    colour_tendons,
+    gl_backend,
+)
+
+__all__ = [
+    "Film", "Offscreen", "QUANTITIES", "Recorded", "Recorder", "RenderingUnavailable", "Watched",
+    "colour_tendons", "gl_backend", "rollout_plot", "series_colours", "temperature_colour",
+]  # fmt: skip
