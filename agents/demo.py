@@ -1,5 +1,7 @@
 """Demos from beginning to end, with everything that is kept of them."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any

@@ -1,5 +1,7 @@
 """Robots by single figures of their design: a path such as ``leg.rod_diameter`` and its value."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping
 from dataclasses import fields, is_dataclass, replace
 from typing import Any

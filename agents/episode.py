@@ -1,5 +1,7 @@
 """An episode under way: what is seen of it, filmed, recorded and summed up, however it ends."""
 
+from __future__ import annotations
+
 import time
 from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence

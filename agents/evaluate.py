@@ -5,6 +5,8 @@ stopped. An episode depends on its seed and on the settings alone, not on the pr
 or on the episodes before it.
 """
 
+from __future__ import annotations
+
 import hashlib
 import json
 import os

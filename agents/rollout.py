@@ -1,5 +1,7 @@
 """The one loop in which a policy acts in a task, and what its steps have earned."""
 
+from __future__ import annotations
+
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass

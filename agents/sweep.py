@@ -6,6 +6,8 @@ loses what was under way, and so does a sweep that is called a second time. Ray 
 sweep begins; the extra ``sweep`` installs it.
 """
 
+from __future__ import annotations
+
 import hashlib
 import itertools
 import json
@@ -58,7 +60,7 @@ class Sweep:
         for trial in self.trials():
             trial.config()  # whoever is wrong says so before anything runs
 
-    def trials(self) -> list["Trial"]:
+    def trials(self) -> list[Trial]:
         """All combinations."""
         combinations = itertools.product(*self.axes.values())
         return [Trial(self, dict(zip(self.axes, point, strict=True))) for point in combinations]

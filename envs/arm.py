@@ -1,5 +1,7 @@
 """``TCA/ArmPickPlace-v0``: a soft arm lays an object into a cup (Sun, Section 4.1.4)."""
 
+from __future__ import annotations
+
 import math
 from functools import partial
 from typing import Any, ClassVar, Unpack

@@ -1,5 +1,7 @@
 """``TCA/TetrapodCourse-v0``: under a plate, over a beam, to a target (Sun, Section 6.3.2)."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 from functools import partial
 from typing import Any, ClassVar, Unpack

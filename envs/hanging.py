@@ -1,5 +1,7 @@
 """A bending module that hangs from a stand, and where its tip rests."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 
 import mujoco

@@ -1,5 +1,7 @@
 """``TCA/MorphModule-v0``: a module bends itself to an angle and keeps it (Sun, Section 6.1)."""
 
+from __future__ import annotations
+
 import math
 from functools import partial
 from typing import Any, Unpack

@@ -1,5 +1,7 @@
 """Reset options as a table: name, shape, bounds, and how each is drawn if it is not given."""
 
+from __future__ import annotations
+
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any

@@ -1,5 +1,7 @@
 """``TCA/BendReach-v0``: three TCAs bring the tip of a soft module to a point (Sun, 4.1.3)."""
 
+from __future__ import annotations
+
 from functools import partial
 from typing import Any, ClassVar, Unpack
 

@@ -1,5 +1,7 @@
 """Spaces as tables: every entry of an observation or action with its name, bounds and unit."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -76,7 +78,7 @@ class Table:
         self._source = np.array([start + abs(k) - 1 for start, k in places], dtype=np.int64)
         self._sign = np.array([np.sign(k) for _, k in places], dtype=np.float32)
 
-    def covering(self, bounds: Mapping[str, tuple[float, float]]) -> "Table":
+    def covering(self, bounds: Mapping[str, tuple[float, float]]) -> Table:
         """The table with rows that reach at least as far as the given bounds, by name."""
         wider = (
             replace(e, low=min(e.low, bounds[e.name][0]), high=max(e.high, bounds[e.name][1]))

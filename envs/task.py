@@ -1,5 +1,7 @@
 """What all tasks share: the course of an episode, how tools reach it, and its picture."""
 
+from __future__ import annotations
+
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from copy import deepcopy

@@ -1,5 +1,7 @@
 """``TCA/TetrapodCrawl-v0``, ``Walk`` and ``Shimmy``: a robot of one shape gets on (Sun, 6.3.2)."""
 
+from __future__ import annotations
+
 import math
 from dataclasses import dataclass, replace
 from functools import partial

@@ -6,6 +6,8 @@ Every task is, bit for bit, what ``gymnasium.make`` gives: the same seeds and ac
 same observations, rewards, flags and infos, at any number of tasks and of threads.
 """
 
+from __future__ import annotations
+
 import os
 from collections.abc import Callable, Mapping, Sequence
 from copy import deepcopy

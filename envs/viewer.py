@@ -5,6 +5,8 @@ lists the others. The mouse turns and moves the view; with Ctrl it pulls at a bo
 by a double click.
 """
 
+from __future__ import annotations
+
 import os
 import sys
 import warnings

@@ -1,5 +1,7 @@
 """Wrappers of the tasks: what is added to an environment without changing it."""
 
+from __future__ import annotations
+
 import atexit
 import time
 from pathlib import Path

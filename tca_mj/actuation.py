@@ -10,6 +10,8 @@ Besides muscles a robot has groups that move no tendon: shape-memory spines, and
 MuJoCo model. ``Group`` is how tables, plots and recordings see all of them.
 """
 
+from __future__ import annotations
+
 from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, fields, is_dataclass, replace
@@ -59,7 +61,7 @@ class Muscle(Protocol):
         """The same muscle, cut to a rest length [m]."""
 
     @classmethod
-    def bank(cls, specs: Sequence[Any]) -> "MuscleBank":
+    def bank(cls, specs: Sequence[Any]) -> MuscleBank:
         """Several of them as a bank."""
 
 
@@ -146,7 +148,7 @@ class MixedBank:
     longest: Array
     breaking_force: Array
 
-    def __copy__(self) -> "MixedBank":
+    def __copy__(self) -> MixedBank:
         """A bank whose heat and supply can be changed alone."""
         return MixedBank(self.specs, [(places, copy(bank)) for places, bank in self.kinds])
 

@@ -12,6 +12,8 @@ a state that MuJoCo complains of) makes a simulation go through the step again o
 where it was, so that it breaks off exactly as it would have alone, and touches no other.
 """
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from copy import copy
 from typing import Any

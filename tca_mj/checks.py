@@ -7,7 +7,7 @@ import math
 from collections.abc import Callable
 from dataclasses import fields
 from functools import cache, partial
-from typing import Annotated, Any, Literal, get_args, get_origin
+from typing import Annotated, Any, Literal, get_args, get_origin, get_type_hints
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -145,8 +145,10 @@ class Checked:
 
 @cache
 def _checks(kind: Any) -> tuple[tuple[str, Callable[[str, Any], Any]], ...]:
-    choices = {f.name: get_args(f.type) for f in fields(kind) if get_origin(f.type) is Literal}
+    types = get_type_hints(kind, include_extras=True)  # which a file may keep as text
+    own = {field.name: types[field.name] for field in fields(kind)}
+    choices = {name: get_args(type) for name, type in own.items() if get_origin(type) is Literal}
     return (
         *((name, partial(require_one_of, choices=each)) for name, each in choices.items()),
-        *((f.name, check) for f in fields(kind) for check in getattr(f.type, "__metadata__", ())),
+        *((name, check) for name in own for check in getattr(own[name], "__metadata__", ())),
     )

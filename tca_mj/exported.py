@@ -6,6 +6,8 @@ as they are at rest at these temperatures, linear in the tendons' lengths; at th
 exact, and about it they are as good as a tangent. Heat, and what it changes, is none of it.
 """
 
+from __future__ import annotations
+
 from pathlib import Path
 
 import mujoco

@@ -5,6 +5,8 @@ their ids known. So this file names them as strings, which Gymnasium resolves in
 and imports nothing but Gymnasium itself.
 """
 
+from __future__ import annotations
+
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from importlib import import_module

@@ -8,6 +8,8 @@ legs it crosses over inside the end section. One TCA has one tension, the same i
 Body frame: z along the centre line from base to tip, x and y in the cross-section.
 """
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -35,7 +37,7 @@ class Helix(Checked):
     phase: Finite = 0.0
 
     @property
-    def legs(self) -> tuple["Helix", ...]:
+    def legs(self) -> tuple[Helix, ...]:
         """The route as a tuple of legs: a helix is its own single leg."""
         return (self,)
 
@@ -72,7 +74,7 @@ class UTurn:
         return (self.out, self.back)
 
     @classmethod
-    def parallel(cls, offset: float, half_width: float, direction: float = 0.0) -> "UTurn":
+    def parallel(cls, offset: float, half_width: float, direction: float = 0.0) -> UTurn:
         """A U of two straight legs.
 
         Args:
@@ -88,7 +90,7 @@ class UTurn:
         return cls(Helix(radius, phase=direction - angle), Helix(radius, phase=direction + angle))
 
     @classmethod
-    def double_helix(cls, radius: float, turns: float, phase: float = 0.0) -> "UTurn":
+    def double_helix(cls, radius: float, turns: float, phase: float = 0.0) -> UTurn:
         """A TCA folded in half and wound as two helices of ``turns`` turns, half a turn apart."""
         return cls(Helix(radius, turns, phase), Helix(radius, turns, phase + np.pi))
 

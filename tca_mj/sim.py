@@ -8,6 +8,8 @@ of the smooth curve that its polyline stands for, and the joints get springs tha
 do the work that this length says: see ``tca_mj.model.smooth``.
 """
 
+from __future__ import annotations
+
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any

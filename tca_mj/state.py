@@ -1,5 +1,7 @@
 """The whole state of a simulation as a value: to go on from, to go back to, to branch at."""
 
+from __future__ import annotations
+
 import copy
 from dataclasses import dataclass
 from typing import Any

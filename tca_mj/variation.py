@@ -6,6 +6,8 @@ from what it scaled before: applying twice is applying once, and factors of one 
 simulation as it was built, bit for bit.
 """
 
+from __future__ import annotations
+
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
@@ -66,7 +68,7 @@ class Variation:
         return tuple(field.name for field in fields(cls))
 
     @classmethod
-    def drawn(cls, draws: Sequence[float], spread: float) -> "Variation":
+    def drawn(cls, draws: Sequence[float], spread: float) -> Variation:
         """A variation from one uniform draw for each field.
 
         Args:

@@ -1,5 +1,7 @@
 """Who acts in a task, by name: its script, nobody, chance, or a saved policy."""
 
+from __future__ import annotations
+
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from importlib import import_module

@@ -12,6 +12,8 @@ is a network, its arrays. Kinds:
 No file is unpickled, and none needs torch or Stable-Baselines3.
 """
 
+from __future__ import annotations
+
 import io
 import json
 from collections.abc import Mapping
@@ -145,7 +147,7 @@ class SavedPolicy:
         return write_whole(path, memory.getvalue())
 
     @classmethod
-    def read(cls, path: str | Path) -> "SavedPolicy":
+    def read(cls, path: str | Path) -> SavedPolicy:
         """Reads a file.
 
         Raises:
@@ -175,7 +177,7 @@ class SavedPolicy:
         except Exception as error:
             raise ValueError(f"{path} is no policy: {type(error).__name__}: {error}") from error
 
-    def make(self, env: Any) -> "Policy":
+    def make(self, env: Any) -> Policy:
         """The policy, ready for an episode in an environment; errors as ``GaitPolicy.in_task``."""
         if self.gait is None:
             assert self.network is not None

@@ -1,5 +1,7 @@
 """A gait on feedback of the temperatures: an observation in, an action out."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 from typing import Any
 
@@ -46,7 +48,7 @@ class GaitPolicy:
         self._left = np.array([1.0, 0.0] * (self.gait.legs // 2), dtype=np.float64)
 
     @classmethod
-    def in_task(cls, env: Any, gait: Gait, steering: float | tuple[float, ...]) -> "GaitPolicy":
+    def in_task(cls, env: Any, gait: Gait, steering: float | tuple[float, ...]) -> GaitPolicy:
         """A gait in an environment.
 
         Raises:
@@ -65,7 +67,7 @@ class GaitPolicy:
     @classmethod
     def told_of(
         cls, task: Any, seen: Table, heat: HeatSpec, gait: Gait, steering: float | tuple[float, ...]
-    ) -> "GaitPolicy":
+    ) -> GaitPolicy:
         """A gait with the limits and the control period of a task, or of a class of tasks."""
         return cls(
             gait=gait, steering=steering, seen=seen, heat=heat, max_power=task.max_power,

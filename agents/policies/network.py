@@ -1,5 +1,7 @@
 """A learned network as plain numbers: from an observation to an action, by NumPy alone."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 
 import numpy as np

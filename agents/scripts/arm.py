@@ -4,6 +4,8 @@
 lift, turn back, bend towards the cup, release.
 """
 
+from __future__ import annotations
+
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -130,7 +132,7 @@ class PickAndPlace:
             self._height = seen.object[2] - self.gains.grasp_depth * seen.width
         return self._command(seen)
 
-    def _next(self, seen: "_Seen") -> str:
+    def _next(self, seen: _Seen) -> str:
         """The phase after this one if its goal is reached, else the same."""
         gains, late = self.gains, self.since > self.gains.phase_limit
         offset = float(np.linalg.norm(seen.object[:2] - seen.gripper[:2]))
@@ -163,7 +165,7 @@ class PickAndPlace:
                 return "done"
         return self.phase
 
-    def _command(self, seen: "_Seen") -> NDArray[np.float32]:
+    def _command(self, seen: _Seen) -> NDArray[np.float32]:
         gains, phase = self.gains, self.phase
         target = np.full(5, -np.inf)  # wanted temperatures [°C]; below ambient means off
         error = np.zeros(2)
@@ -194,7 +196,7 @@ class PickAndPlace:
         self._body = heat.body_after(self._body, now, _DT)
         return np.maximum(hold + heat.capacity * (wanted - now) / self.gains.settling, 0.0)
 
-    def _steer(self, seen: "_Seen", error: Array) -> Array:
+    def _steer(self, seen: _Seen, error: Array) -> Array:
         """Temperatures of the three bending TCAs that take the gripper along ``error`` [m].
 
         Proportional and integral; a TCA bends the arm to its own side.
@@ -210,7 +212,7 @@ class PickAndPlace:
         brace = self.gains.brace * share.max()
         return seen.ambient + np.maximum(share, brace)
 
-    def _climb(self, seen: "_Seen") -> float:
+    def _climb(self, seen: _Seen) -> float:
         """Velocity of the base [m/s]."""
         gains = self.gains
         match self.phase:

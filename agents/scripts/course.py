@@ -5,6 +5,8 @@ of the body: soften the spines, bend them with their TCAs to an angle, hold it, 
 harden, release. All it knows is the observation.
 """
 
+from __future__ import annotations
+
 import math
 from dataclasses import dataclass, replace
 

@@ -1,5 +1,7 @@
 """The scripted policy of ``TCA/MorphModule-v0``: Sun's sequence, by the TCA's own resistance."""
 
+from __future__ import annotations
+
 import math
 from dataclasses import dataclass, field
 from typing import Any

@@ -1,5 +1,7 @@
 """The scripted policy of ``TCA/BendReach-v0``: the inverse of the statics, and feedback on it."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass, field
 from typing import Any
 

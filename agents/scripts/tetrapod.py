@@ -5,6 +5,8 @@ a search for speed in each task: CMA-ES over period, starts, duties and temperat
 all legs, 120 to 216 gaits of which each went for half a minute; the walk's on feet of 6 mm.
 """
 
+from __future__ import annotations
+
 from types import MappingProxyType
 from typing import Any
 

@@ -1,5 +1,7 @@
 """Settings of a training run by deep reinforcement learning, and a default for every task."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import partial

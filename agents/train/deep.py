@@ -5,6 +5,8 @@ environments, generators, curve) is replaced in one file. A run that goes on fro
 last bit, what it would have done without the interruption.
 """
 
+from __future__ import annotations
+
 import io
 import os
 import pickle

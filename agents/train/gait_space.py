@@ -1,5 +1,7 @@
 """Gaits as points of a unit cube, in which a search may look for better ones."""
 
+from __future__ import annotations
+
 import math
 from collections import defaultdict
 from dataclasses import dataclass, replace

@@ -1,5 +1,7 @@
 """The vector environment in the form that Stable-Baselines3 learns from."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from typing import Any
 
@@ -49,7 +51,7 @@ class TaskVecEnv(VecEnv):
     @classmethod
     def make(
         cls, id: str, num_envs: int, *, scaled: bool = False, **kwargs: Any
-    ) -> "TaskVecEnv":
+    ) -> TaskVecEnv:
         """Makes the vector environment, too.
 
         Args:

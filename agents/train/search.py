@@ -5,6 +5,8 @@ against it. Nothing depends on how many processes there are, on the order in whi
 on whether the run was interrupted: all draws of a generation come from the seed and its number.
 """
 
+from __future__ import annotations
+
 import pickle
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace

@@ -1,5 +1,7 @@
 """Cases drawn by seed, their answers by theory and by MuJoCo, and the differences."""
 
+from __future__ import annotations
+
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any

@@ -1,5 +1,7 @@
 """Single statements about theory and chain, each computed and held against what is asked."""
 
+from __future__ import annotations
+
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace

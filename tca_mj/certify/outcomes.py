@@ -1,5 +1,7 @@
 """Every case of a module answered by theory and by MuJoCo, and what many of them say together."""
 
+from __future__ import annotations
+
 import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor

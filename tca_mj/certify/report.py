@@ -1,5 +1,7 @@
 """The certificate: how far the chain of every module is from theory; compute, print, write."""
 
+from __future__ import annotations
+
 import math
 import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence

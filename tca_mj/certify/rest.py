@@ -6,6 +6,8 @@ steps lead to its neighbourhood, Newton's method on the joints' loads ends them.
 user does: a ``Simulation`` is heated from the cold and left alone.
 """
 
+from __future__ import annotations
+
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple

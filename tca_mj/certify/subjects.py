@@ -3,6 +3,8 @@
 A new module or limb is one more function and one more entry of ``SUBJECTS``.
 """
 
+from __future__ import annotations
+
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial

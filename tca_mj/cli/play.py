@@ -1,5 +1,7 @@
 """To look at: ``demo`` records, ``export`` reads back, ``list`` names and ``view`` shows tasks."""
 
+from __future__ import annotations
+
 import argparse
 import sys
 from pathlib import Path

@@ -7,6 +7,8 @@ heat loss takes, and what brings the TCA to its temperature within a response ti
 the temperature, it heats late cycles no hotter than early ones.
 """
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 
 import numpy as np

@@ -9,6 +9,8 @@ The sequence is a frozen description; where it stands is a value that goes in an
 be aborted and restarted at any moment, and gives up with everything off when something is wrong.
 """
 
+from __future__ import annotations
+
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace

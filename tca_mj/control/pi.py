@@ -9,6 +9,8 @@ small: ``near``. At that moment the integral takes over what K_P e loses, so tha
 does not jump.
 """
 
+from __future__ import annotations
+
 import math
 from dataclasses import dataclass
 from typing import Annotated

@@ -1,5 +1,7 @@
 """The static shape of a chain: MuJoCo's answer to the question that a rod solver answers."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from copy import copy
 from dataclasses import replace

@@ -1,5 +1,7 @@
 """What a robot of one's own is built with: TCAs laid into chains, and a stage to look at it on."""
 
+from __future__ import annotations
+
 import difflib
 
 import mujoco

@@ -10,6 +10,8 @@ MuJoCo's own ``<composite type="cable">`` is not used: it cannot stretch, its st
 changed while the simulation runs, and MuJoCo 4 no longer has it.
 """
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Literal

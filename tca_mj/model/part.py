@@ -1,5 +1,7 @@
 """A built piece of a robot: a MuJoCo specification, and the TCAs and spines in it."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
@@ -26,7 +28,7 @@ class Part:
     spines: tuple[RoutedSpine, ...] = ()
 
     def attach(
-        self, child: "Part", *, to: str, prefix: str, names: Sequence[str] | None = None
+        self, child: Part, *, to: str, prefix: str, names: Sequence[str] | None = None
     ) -> None:
         """Attaches ``child`` rigidly to the site ``to`` of this part; the child is used up.
 

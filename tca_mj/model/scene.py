@@ -1,5 +1,7 @@
 """Static scenes: an arena from a file, with objects from files put into it."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping
 from pathlib import Path
 

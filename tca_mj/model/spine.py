@@ -1,5 +1,7 @@
 """A shape-memory spine in a chain: whose joints it stiffens, and how much."""
 
+from __future__ import annotations
+
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -39,7 +41,7 @@ class RoutedSpine:
     tca: str
     damping_time: float = 5e-3
 
-    def renamed(self, prefix: str) -> "RoutedSpine":
+    def renamed(self, prefix: str) -> RoutedSpine:
         """The same with a prefix before all names."""
         joints = tuple((prefix + joint, share) for joint, share in self.joints)
         return replace(self, name=prefix + self.name, tca=prefix + self.tca, joints=joints)

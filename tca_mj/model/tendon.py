@@ -11,6 +11,8 @@ by F h²/(4 EI). ``RoutedTca.crossings`` says what is needed to give the differe
 joints; ``tca_mj.model.smooth`` does it.
 """
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -77,7 +79,7 @@ class RoutedTca:
     stretch: float
     crossings: tuple[Crossing, ...]
 
-    def renamed(self, prefix: str) -> "RoutedTca":
+    def renamed(self, prefix: str) -> RoutedTca:
         """The same TCA in a part whose names all got ``prefix`` in front."""
         crossings = tuple(
             replace(item, joints={motion: prefix + name for motion, name in item.joints.items()})

@@ -1,5 +1,7 @@
 """The 3D bending module: a silicone cylinder with three parallel TCAs (Sun, Section 4.1.3)."""
 
+from __future__ import annotations
+
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace

@@ -1,5 +1,7 @@
 """The tetrapod's continuum leg: an elastic rod, rigid plates and three TCAs (Sun, Fig. 6.13B)."""
 
+from __future__ import annotations
+
 import math
 from dataclasses import dataclass, field, replace
 from functools import partial

@@ -5,6 +5,8 @@ on the outside of the ring, through the whole body and back; contracting, it str
 and the fingers open. Cold, they close and hold an object without power.
 """
 
+from __future__ import annotations
+
 import math
 from dataclasses import dataclass, field, replace
 

@@ -5,6 +5,8 @@ The section's y axis lies in the plane of bending, x across it. The TCA runs on 
 that a positive angle of ``bend_x`` bends the module towards its TCA.
 """
 
+from __future__ import annotations
+
 import math
 from dataclasses import dataclass, field
 

@@ -1,5 +1,7 @@
 """The twisting module: a silicone cylinder wrapped by one TCA (Sun, Section 4.1.2)."""
 
+from __future__ import annotations
+
 import math
 from dataclasses import dataclass, field
 

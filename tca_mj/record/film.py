@@ -3,6 +3,8 @@
 They need imageio and imageio-ffmpeg, which are loaded when the first one is begun.
 """
 
+from __future__ import annotations
+
 import importlib
 from pathlib import Path
 from typing import Any

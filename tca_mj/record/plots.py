@@ -4,6 +4,8 @@ Matplotlib is an optional dependency: it is imported when a plot is drawn, witho
 thus without a display or global state.
 """
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any

@@ -21,6 +21,8 @@ Entities:
 * ``/reward/<term>`` and ``/events``.
 """
 
+from __future__ import annotations
+
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, Protocol

@@ -9,6 +9,8 @@ On Debian and Ubuntu ``egl`` needs the packages ``libegl1`` and ``libgl1-mesa-dr
 driver), ``osmesa`` needs ``libosmesa6``.
 """
 
+from __future__ import annotations
+
 import atexit
 import functools
 import importlib

@@ -3,6 +3,8 @@
 The arm hangs from a base that moves only up and down.
 """
 
+from __future__ import annotations
+
 from dataclasses import dataclass, field
 
 import mujoco

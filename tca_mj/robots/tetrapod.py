@@ -8,6 +8,8 @@ The three spines bend alike, because rigid rails hold their ends. They are there
 joints all three of them stiffen, each at its own temperature.
 """
 
+from __future__ import annotations
+
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field

@@ -5,6 +5,8 @@ the legs twist. The middle spine is in the tree. The other two start at the righ
 close them at the left one. It has several times the degrees of freedom and is for comparisons.
 """
 
+from __future__ import annotations
+
 import math
 from dataclasses import replace
 

@@ -1,5 +1,7 @@
 """What a soft beam is made of: section, stiffness, mass and reference shape."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 from functools import partial
 from typing import Annotated, Any
@@ -98,7 +100,7 @@ class BeamSpec(Checked):
         density: float,
         outer_diameter: float | None = None,
         **more: Any,
-    ) -> "BeamSpec":
+    ) -> BeamSpec:
         """A round beam.
 
         Args:
@@ -136,7 +138,7 @@ class BeamSpec(Checked):
         shear: float,
         density: float,
         **more: Any,
-    ) -> "BeamSpec":
+    ) -> BeamSpec:
         """A beam of rectangular section, ``width`` along x and ``height`` along y; else as round.
 
         The torsion constant is Saint-Venant's, by its series (Timoshenko & Goodier, Theory of

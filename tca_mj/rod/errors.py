@@ -1,5 +1,7 @@
 """What a solver of a rod says where it finds no shape."""
 
+from __future__ import annotations
+
 
 class RodSolveError(ArithmeticError):
     """The shape of a rod was not found.

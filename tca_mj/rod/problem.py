@@ -1,5 +1,7 @@
 """The question that every static solver of soft bodies answers: bodies, strands and loads."""
 
+from __future__ import annotations
+
 import math
 from collections.abc import Sequence
 from dataclasses import KW_ONLY, dataclass

@@ -1,5 +1,7 @@
 """What every solver of a soft body's static shape returns."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,5 +1,7 @@
 """Static shape of soft bodies with strands inside: the public functions and the solvers' door."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from numbers import Integral
 from typing import Any

@@ -1,5 +1,7 @@
 """Several spines advanced together, with all joints that they stiffen."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
 

@@ -3,6 +3,8 @@
 Only ratios and checks come from here: the loss of a spine is fitted to its natural cooling.
 """
 
+from __future__ import annotations
+
 import math
 from dataclasses import dataclass
 from functools import partial

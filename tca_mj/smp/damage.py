@@ -5,6 +5,8 @@ spine becomes rigid damages it for good; to go on relaxing it does no harm but t
 becomes inaccurate. Stiffening is safe once the angle changes by less than 3° in 20 s.
 """
 
+from __future__ import annotations
+
 import math
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -49,7 +51,7 @@ class DamageSpec(Checked):
         number("soft_modulus", self.soft_modulus, below=self.rigid_modulus, unit="Pa")
 
     @classmethod
-    def of(cls, smp: SmpSpec) -> "DamageSpec":
+    def of(cls, smp: SmpSpec) -> DamageSpec:
         """Bounds for a material: rigid is its modulus at the lower end of its transition."""
         return cls(rigid_modulus=float(smp.modulus(smp.rigid_below)))
 

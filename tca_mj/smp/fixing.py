@@ -21,6 +21,8 @@ Glass melts in proportion, not last in first out: a temperature that goes up and
 transition lets a loaded spine creep towards the shape that the rubbery network alone would hold.
 """
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -46,7 +48,7 @@ class SpineState:
     glass: Array
 
     @classmethod
-    def rest(cls, smp: SmpSpec, memory: ArrayLike, temperature: ArrayLike = 25.0) -> "SpineState":
+    def rest(cls, smp: SmpSpec, memory: ArrayLike, temperature: ArrayLike = 25.0) -> SpineState:
         """A spine in its memorised shape at a temperature, without stress.
 
         Raises:

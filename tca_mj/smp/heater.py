@@ -9,6 +9,8 @@ temperature at which that cooling starts, which is an estimate. What follows: th
 the speed of its air, and the time to heat at 25 V, which needs neither C nor R.
 """
 
+from __future__ import annotations
+
 import math
 from dataclasses import dataclass
 from functools import partial
@@ -63,7 +65,7 @@ class HeaterSpec(Checked):
         cool_time: float = COOL_TIME,
         fan_speed: float = FAN_SPEED,
         ambient: float = 25.0,
-    ) -> "HeaterSpec":
+    ) -> HeaterSpec:
         """Constants from the natural cooling alone.
 
         The capacity, the polymer's own, scales powers and energies and no time.
@@ -140,7 +142,7 @@ class HeaterState:
     energy_lost: Array
 
     @classmethod
-    def rest(cls, spec: HeaterSpec, shape: tuple[int, ...] = ()) -> "HeaterState":
+    def rest(cls, spec: HeaterSpec, shape: tuple[int, ...] = ()) -> HeaterState:
         """At the temperature of the surroundings, no energy counted."""
         temperature = np.broadcast_to(spec.ambient, shape).copy()
         return cls(temperature, np.zeros(shape), np.zeros(shape))

@@ -4,6 +4,8 @@ The simplest thing that softens, bends, hardens and recovers. It answers in micr
 chain of links must agree with, and serves the tests and figures of sequences.
 """
 
+from __future__ import annotations
+
 import math
 from dataclasses import dataclass
 

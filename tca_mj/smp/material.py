@@ -1,5 +1,7 @@
 """Modulus of a shape-memory polymer over temperature, and the spine made of it."""
 
+from __future__ import annotations
+
 import math
 from dataclasses import dataclass, field
 

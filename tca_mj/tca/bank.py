@@ -1,5 +1,7 @@
 """n TCAs advanced together: heat in, temperature and pull out."""
 
+from __future__ import annotations
+
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple

@@ -17,6 +17,8 @@ surface lets nothing out: exact once the ring warms evenly, and for the first se
 per cent (``tests/test_embedding.py`` compares with the diffusion of heat in the ring).
 """
 
+from __future__ import annotations
+
 import math
 from dataclasses import replace
 

@@ -1,5 +1,7 @@
 """How much of the shape of its mandrel a coil keeps after annealing."""
 
+from __future__ import annotations
+
 import math
 from itertools import pairwise
 

@@ -4,6 +4,8 @@ Every function takes one ``FibreSpec``, or a ``FibreTable`` of n fibres whose te
 stand on the last axis.
 """
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
@@ -29,7 +31,7 @@ class FibreTable(NamedTuple):
     load_softening: tuple[Array, Array, Array]
 
     @classmethod
-    def of(cls, fibres: Sequence[FibreSpec]) -> "FibreTable":
+    def of(cls, fibres: Sequence[FibreSpec]) -> FibreTable:
         """Collects the numbers of ``fibres``, in their order."""
         columns = [column(fibres, name) for name in cls._fields]
         parts: list[Any] = [tuple(frozen(each.T)) if each.ndim > 1 else each for each in columns]

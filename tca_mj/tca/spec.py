@@ -6,6 +6,8 @@ the inserted twist and the mass per length, which are printed twice. What was we
 its own and does not follow from the radius, which is the one that the moduli were fitted with.
 """
 
+from __future__ import annotations
+
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
@@ -188,7 +190,7 @@ class TcaSpec(Checked):
         groove_pitch_angle: float,
         annealing_temperature: float | None = None,
         minimum_pitch_angle: float | None = None,
-    ) -> "TcaSpec":
+    ) -> TcaSpec:
         """A TCA from its making: fibre in a helical groove, annealed; Sun, Section 2.1.1.
 
         The made length is fibre_length sin(groove pitch), the radius on the mandrel is (core +
@@ -277,12 +279,12 @@ class TcaSpec(Checked):
             body_loss=body.loss * length,
         )  # fmt: skip
 
-    def of_length(self, rest_length: float) -> "TcaSpec":
+    def of_length(self, rest_length: float) -> TcaSpec:
         """A piece of the same coil (in the same body) with another natural length [m]."""
         number("rest_length", rest_length, above=0.0)
         return replace(self, fibre_length=rest_length / self.rest_length * self.fibre_length)
 
-    def of_pitch(self, pitch_angle: float) -> "TcaSpec":
+    def of_pitch(self, pitch_angle: float) -> TcaSpec:
         """The same coil crept to another natural pitch angle [rad]; it keeps its turns.
 
         The coil's radius follows, cos(pitch)/winding; the contact length stays.

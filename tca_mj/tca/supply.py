@@ -5,6 +5,8 @@ changes with its length and temperature: P <= U^2/R and P <= I^2 R. A thermostat
 for a temperature: what the heat loss takes, and what brings the TCA there within a response time.
 """
 
+from __future__ import annotations
+
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, fields, is_dataclass
@@ -135,7 +137,7 @@ class Supply(Checked):
             power = np.minimum(power, np.square(self.max_current) * ohms)
         return np.minimum(power, self.max_power)
 
-    def like(self, other: "Supply") -> bool:
+    def like(self, other: Supply) -> bool:
         """Whether another supply does the same."""
         return _equal(self, other)
 

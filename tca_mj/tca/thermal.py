@@ -10,6 +10,8 @@ Without conductance G the TCA is alone, with an infinite one the two are a singl
 C + C_b and loss λ + λ_b.
 """
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 from functools import partial
 from typing import Annotated, NamedTuple, Self

@@ -7,6 +7,8 @@ hanging by forty: a statement about the angle is one about both.
 The verdict on the reported angles is by eq. (4.1), standing: see docs/studies.md.
 """
 
+from __future__ import annotations
+
 import math
 from collections.abc import Mapping
 from dataclasses import replace

@@ -7,6 +7,8 @@ a constant of the model is *fitted*, whatever its value: agreement with it prove
 ``facts.toml`` holds what is printed and how it is told; ``finding`` judges one fact of it.
 """
 
+from __future__ import annotations
+
 import math
 import tomllib
 from collections.abc import Iterable, Sequence

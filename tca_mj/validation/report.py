@@ -1,5 +1,7 @@
 """The validation report of the TCA: recompute, judge, print, write."""
 
+from __future__ import annotations
+
 from collections.abc import Callable
 from dataclasses import asdict
 from functools import partial

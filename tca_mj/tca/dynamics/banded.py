@@ -5,6 +5,8 @@ the steps are equations of all lengths together, and Newton's method solves a wi
 a banded matrix in a few iterations.
 """
 
+from __future__ import annotations
+
 from dataclasses import fields
 
 import numpy as np

@@ -1,5 +1,7 @@
 """What hangs at TCAs, what heats them, and the states of their motion."""
 
+from __future__ import annotations
+
 import math
 from dataclasses import dataclass
 from typing import Literal
@@ -33,7 +35,7 @@ class Load(Checked):
     damping: NotNegatives = 0.0
 
     @classmethod
-    def weight(cls, mass: float | Array, damping: float | Array = 0.0) -> "Load":
+    def weight(cls, mass: float | Array, damping: float | Array = 0.0) -> Load:
         """A hanging mass [kg]."""
         weight = within("mass", mass, at_least=0.0, unit="kg") * GRAVITY
         return cls(force=weight, mass=mass, damping=damping)
@@ -46,7 +48,7 @@ class Load(Checked):
         reference: float | Array,
         mass: float | Array = 0.0,
         damping: float | Array = 0.0,
-    ) -> "Load":
+    ) -> Load:
         """A linear spring between the TCA's end and a wall, Sun, Section 3.4.4, case 2.
 
         Args:
@@ -113,7 +115,7 @@ class Course(LoadState):
     time: Array
 
     @classmethod
-    def of(cls, states: LoadState, dt: float) -> "Course":
+    def of(cls, states: LoadState, dt: float) -> Course:
         """States ``dt`` apart, (k, ..., n)."""
         time = dt * np.arange(len(states.length), dtype=np.float64)
         return cls(states.length, states.velocity, states.temperature, states.power, time)

@@ -18,6 +18,8 @@ is the better choice: every length is the equilibrium of its temperature. Under 
 rest at a constant voltage of 5 or 6 V, the two differ by less than 0.1 mm until the turns touch.
 """
 
+from __future__ import annotations
+
 from collections.abc import Callable, Sequence
 from dataclasses import astuple
 from functools import partial

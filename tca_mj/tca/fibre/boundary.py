@@ -7,6 +7,8 @@ centre line, and knows the end turns of the coil. The wrench is found by ``rod.d
 shape then by integrating h' = h u/2, p' = R v (Section 3.4.2), exactly for constant strain.
 """
 
+from __future__ import annotations
+
 import math
 from dataclasses import dataclass
 from typing import NamedTuple

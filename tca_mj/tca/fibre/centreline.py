@@ -5,6 +5,8 @@ where it starts. Frames have z along the tangent; how they turn about it is free
 section is round. "Sun" is J. Sun's dissertation, Colorado State University.
 """
 
+from __future__ import annotations
+
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -52,7 +54,7 @@ class Centreline(Checked):
         matrix_quaternion(self.rotation)
 
     @classmethod
-    def helix(cls, *, radius: float, pitch_angle: float, length: float) -> "Centreline":
+    def helix(cls, *, radius: float, pitch_angle: float, length: float) -> Centreline:
         """A right-handed helix that hangs down from z = 0 about the world's z axis.
 
         p* = (r cos phi, -r sin phi, -s sin alpha*), phi = s cos(alpha*)/r: Sun, eq. (3.12), turned
@@ -78,7 +80,7 @@ class Centreline(Checked):
         )
 
     @classmethod
-    def of_tca(cls, tca: TcaSpec) -> "Centreline":
+    def of_tca(cls, tca: TcaSpec) -> Centreline:
         """The helix of a TCA at its natural length, hanging down."""
         return cls.helix(
             radius=tca.coil_radius, pitch_angle=tca.pitch_angle, length=tca.fibre_length
@@ -87,7 +89,7 @@ class Centreline(Checked):
     @classmethod
     def of_curve(
         cls, position: Callable[[Array], ArrayLike], start: float, end: float, samples: int = 4001
-    ) -> "Centreline":
+    ) -> Centreline:
         """Any curve p(t), t from ``start`` to ``end``; t need not be the arc length.
 
         Args:
@@ -103,7 +105,7 @@ class Centreline(Checked):
         return cls.of_points(position(parameter), parameter)
 
     @classmethod
-    def of_points(cls, points: ArrayLike, parameter: ArrayLike | None = None) -> "Centreline":
+    def of_points(cls, points: ArrayLike, parameter: ArrayLike | None = None) -> Centreline:
         """The smooth curve through given points: a spline of degree five.
 
         Its frames turn about the tangent as little as possible (u_z* = 0, Bishop's frame), so that

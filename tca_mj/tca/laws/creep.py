@@ -21,6 +21,8 @@ lengths and the two time scales, and not the shape of the curve between them. In
 weight gives no hysteresis, as its shift is steady, too; that is ``hysteresis_damping``.
 """
 
+from __future__ import annotations
+
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

@@ -1,5 +1,7 @@
 """What a law of TCAs' tensions is: rod theory, its table, or one that somebody measured."""
 
+from __future__ import annotations
+
 from collections.abc import Callable, Sequence
 from typing import Literal, Protocol
 

@@ -31,6 +31,8 @@ With the E/G = 5.5 of the catalogue that needs natural pitches above 0.88 rad, w
 0.45 rad; the catalogue ends at 0.39 rad. There a length has one tension, but a load many lengths.
 """
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple

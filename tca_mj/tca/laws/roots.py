@@ -1,5 +1,7 @@
 """Roots of rising functions inside a shrinking bracket, every element by itself."""
 
+from __future__ import annotations
+
 from collections.abc import Callable
 
 import numpy as np

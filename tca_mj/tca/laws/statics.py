@@ -24,6 +24,8 @@ Loads above ``breaking_force`` and temperatures outside ``fibre.temperature_rang
 the laws extrapolate.
 """
 
+from __future__ import annotations
+
 from collections.abc import Callable
 from typing import get_args
 

@@ -1,5 +1,7 @@
 """The tension law of n TCAs, read from their surfaces: three times as fast as the rods."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 
 import numpy as np

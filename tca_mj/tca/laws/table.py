@@ -12,6 +12,8 @@ The natural length and the reference temperature are knots, so that a cold TCA a
 in the table, too, to rounding. A table is made in some 20 ms and kept while Python runs.
 """
 
+from __future__ import annotations
+
 import math
 from dataclasses import astuple, dataclass, replace
 from functools import lru_cache

@@ -1,5 +1,7 @@
 """What a real circuit measures of a TCA's resistance: noise, resolution and pulsed heating."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 from functools import partial
 from typing import Annotated

@@ -18,6 +18,8 @@ A sensor measures the mean current under a pulsed voltage, with noise and steps 
 and a polynomial of third order reads the displacement from it (``fit_displacement``).
 """
 
+from __future__ import annotations
+
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -48,7 +50,7 @@ class WireTable(NamedTuple):
     contraction: Array
 
     @classmethod
-    def of(cls, specs: Sequence[TcaSpec]) -> "WireTable":
+    def of(cls, specs: Sequence[TcaSpec]) -> WireTable:
         """Collects the numbers of ``specs``, in their order."""
         rest_length = column(specs, "rest_length")
         return cls(
