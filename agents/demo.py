@@ -44,7 +44,7 @@ def play(
         arguments: Of the task; None for what a policy with a name needs, else the task's own.
         out: Folder for the files, made if it is missing; None to write nothing.
         video: Whether to make the film, which takes longer than the simulation.
-        speed: Simulated seconds per second of film; None for what suits the task.
+        speed: Simulated seconds per second of film [1]; None for what suits the task.
         max_duration: Simulated time after which to stop [s]; None for the task's own limit.
         progress: Whether to show a progress bar, where there is a terminal.
 

@@ -29,7 +29,12 @@ def robot_of(task: str, design: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def designed(spec: Any, design: Mapping[str, Any]) -> Any:
-    """A specification with other figures; see ``robot_of``."""
+    """A specification with other figures; errors as ``robot_of``.
+
+    Args:
+        spec: The specification, which stays as it is.
+        design: Values by path, such as ``leg.rod_diameter``.
+    """
     # Whole TCAs first, then what is changed in them.
     for path in sorted(design, key=lambda path: path.count(".")):
         spec = _changed(spec, path, path, design[path])

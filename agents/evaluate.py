@@ -129,7 +129,11 @@ class Evaluation(Checked):
 
 
 def run_episode(evaluation: Evaluation, seed: int) -> dict[str, Any]:
-    """One episode.
+    """Runs one episode.
+
+    Args:
+        evaluation: What is evaluated.
+        seed: Seed of the episode.
 
     Returns:
         ``seed``, ``steps``, ``ending``, and the figures of ``METRICS``: ``return``; ``success``
@@ -235,7 +239,12 @@ def evaluate(
 
 
 def kept(path: Path, key: str) -> dict[int, dict[str, Any]]:
-    """Episodes in a file that have ``key``, by seed; a line that was cut off is skipped."""
+    """Episodes in a file that have ``key``, by seed; a line that was cut off is skipped.
+
+    Args:
+        path: The file, one JSON object a line.
+        key: What ``Evaluation.key`` says.
+    """
     found = {}
     for line in path.read_text(encoding="utf-8").splitlines() if path.exists() else ():
         try:
@@ -269,6 +278,9 @@ def figures(rows: Sequence[dict[str, Any]]) -> dict[str, dict[str, float | None]
     ``most``. Intervals are Student's t, Wilson's for ``success``. Energy per metre and cost of
     transport E/(m g d) are ratios of sums over episodes, with percentiles of 10 000 bootstrap
     resamples of the episodes; they are None if the robot did not get on.
+
+    Args:
+        rows: Episodes, as ``run_episode`` returns them.
     """
     columns = {name: np.array([float(row[name]) for row in rows])
                for name in (*METRICS, "weight") if name in rows[0]}  # fmt: skip
@@ -321,13 +333,23 @@ def _ratio(above: NDArray[np.float64], below: NDArray[np.float64]) -> dict[str, 
 
 
 def label(name: str) -> str:
-    """A figure's name and unit, as the title of a row or column."""
+    """A figure's name and unit, as the title of a row or column.
+
+    Args:
+        name: Name of the figure, one of ``METRICS``.
+    """
     unit = METRICS[name][0]
     return name.replace("_", " ") + (f" [{unit}]" if unit else "")
 
 
 def cell(name: str, figure: dict[str, float | None], *, interval: bool = True) -> str:
-    """A figure in its unit: mean, and the interval in brackets."""
+    """A figure in its unit: mean, and the interval in brackets.
+
+    Args:
+        name: Name of the figure, one of ``METRICS``.
+        figure: Its mean and interval, as ``figures`` returns them.
+        interval: Whether the interval is wanted.
+    """
     text, low, high, *_ = _shown(name, figure)
     return f"{text} ({low} to {high})" if interval and low else text
 

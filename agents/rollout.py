@@ -21,7 +21,7 @@ class Step:
 
     Attributes:
         observation: What is seen.
-        reward: What it earned.
+        reward: What it earned [1].
         terminated, truncated: Whether the episode is over.
         info: What the task says.
     """
@@ -73,7 +73,13 @@ def rollout(
 
 
 def tally(sums: dict[str, float], reward: float, info: Mapping[str, Any]) -> None:
-    """Adds to ``return``, ``length`` and each ``term_NAME`` what a step has earned."""
+    """Adds to ``return``, ``length`` and each ``term_NAME`` what a step has earned.
+
+    Args:
+        sums: The sums so far, which are changed.
+        reward: Reward of the step [1].
+        info: What the task says of it.
+    """
     sums["return"] += float(reward)
     sums["length"] += 1.0
     for name, term in info.get("reward_terms", {}).items():
@@ -81,7 +87,11 @@ def tally(sums: dict[str, float], reward: float, info: Mapping[str, Any]) -> Non
 
 
 def earned(steps: Iterable[Step]) -> dict[str, float]:
-    """Sums over a whole episode: ``return``, ``length``, ``success``, and each reward term."""
+    """Sums over a whole episode: ``return``, ``length``, ``success``, and each reward term.
+
+    Args:
+        steps: The steps, as ``rollout`` yields them.
+    """
     sums = defaultdict(float, dict.fromkeys(("return", "length", "success"), 0.0))
     for number, step in enumerate(steps):
         sums["success"] = float(step.info["success"])

@@ -313,5 +313,5 @@ class ArmPickPlace(SimulatedTask):
         }
 
 
-ArmPickPlaceVector = partial(TaskVector, ArmPickPlace)
+ArmPickPlaceVector = partial(TaskVector, ArmPickPlace)  # several, stepped together
 """Several of them as one vector environment, made by ``gymnasium.make_vec``."""

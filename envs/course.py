@@ -59,16 +59,16 @@ _COLD = 80.0  # temperature up to which a spine is rigid, Sun, Section 6.1.3 [°
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Places:
-    """Where things are along the course, read from its file [m].
+    """Where things are along the course, read from its file.
 
     Attributes:
-        stand: Where the whole robot is beyond the plate, with a hand's breadth to spare.
-        first_edge: End of the first desk.
-        second_edge: Start of the second desk.
-        beam_end: End of the beam, over the second desk.
-        target: Middle of the target.
-        target_size: Half sizes of the target along x and y.
-        leg_station: Fore-aft distance of the legs' roots from the robot's middle.
+        stand: Where the whole robot is beyond the plate, with a hand's breadth to spare [m].
+        first_edge: End of the first desk [m].
+        second_edge: Start of the second desk [m].
+        beam_end: End of the beam, over the second desk [m].
+        target: Middle of the target [m].
+        target_size: Half sizes of the target along x and y [m].
+        leg_station: Fore-aft distance of the legs' roots from the robot's middle [m].
     """
 
     stand: float
@@ -307,5 +307,5 @@ class TetrapodCourse(SimulatedTask):
         }
 
 
-TetrapodCourseVector = partial(TaskVector, TetrapodCourse)
+TetrapodCourseVector = partial(TaskVector, TetrapodCourse)  # several, stepped together
 """Several of them as one vector environment, made by ``gymnasium.make_vec``."""

@@ -284,9 +284,13 @@ class MorphModule(SimulatedTask):
 
 
 def hanging_module(spec: MorphingSpec) -> Part:
-    """The scene: the module hangs from a stand and bends in the x-z plane."""
+    """The scene: the module hangs from a stand and bends in the x-z plane.
+
+    Args:
+        spec: The module.
+    """
     return hang(morphing_module(spec), _CLAMP, _HANGING, "morph_stand")
 
 
-MorphModuleVector = partial(TaskVector, MorphModule)
+MorphModuleVector = partial(TaskVector, MorphModule)  # several, stepped together
 """Several of them as one vector environment, made by ``gymnasium.make_vec``."""

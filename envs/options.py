@@ -24,8 +24,8 @@ class Option:
         about: What it means, in a few words.
         unit: Unit, ``-`` for none.
         shape: Shape of the numbers.
-        low: Lower bound of each of them.
-        high: Upper bound.
+        low: Lower bound of each of them [``unit``].
+        high: Upper bound [``unit``].
         choices: What can be chosen, if it is no number.
         draw: Its value if none is given, from the episode's generator and the rows above; it is
             called in any case, so that a value that is given shifts no other draw.
@@ -112,7 +112,11 @@ class Options:
 
 @dataclass(frozen=True, slots=True)
 class Constant:
-    """Draws nothing, and gives ``value``."""
+    """Draws nothing, and gives a value.
+
+    Attributes:
+        value: The value.
+    """
 
     value: Any
 
@@ -122,7 +126,13 @@ class Constant:
 
 @dataclass(frozen=True, slots=True)
 class Uniform:
-    """Draws numbers between ``low`` and ``high``: one, or an array of ``size``."""
+    """Draws numbers between two others, in the unit of the option.
+
+    Attributes:
+        low: Least number [unit of the option].
+        high: Largest number [unit of the option].
+        size: How many; None for one number, which is no array.
+    """
 
     low: float
     high: float

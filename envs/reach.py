@@ -242,5 +242,5 @@ class BendReach(SimulatedTask):
         return float(np.arccos(np.clip(down, -1.0, 1.0)))
 
 
-BendReachVector = partial(TaskVector, BendReach)
+BendReachVector = partial(TaskVector, BendReach)  # several, stepped together
 """Several of them as one vector environment, made by ``gymnasium.make_vec``."""

@@ -18,12 +18,14 @@ class Entry:
     Attributes:
         name: What it is.
         size: How many numbers it takes.
-        low: Lower bound.
-        high: Upper bound.
+        low: Lower bound [``unit``, as all numbers of the row].
+        high: Upper bound [``unit``].
         unit: Unit, ``-`` for none.
-        off: Of an action, what leaves the robot alone; None for the middle of the bounds.
-        centre: What is scaled to 0, the same for left and right.
-        scale: How far from there is scaled to 1; None for half the way between the bounds.
+        off: Of an action, what leaves the robot alone [``unit``]; None for the middle of the
+            bounds.
+        centre: What is scaled to 0, the same for left and right [``unit``].
+        scale: How far from there is scaled to 1 [``unit``]; None for half the way between the
+            bounds.
         mirror: Where each number comes from in the mirror that swaps left and right: a place in
             the row, from 1, negative if the sign changes; empty if nothing does.
     """

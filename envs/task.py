@@ -83,7 +83,7 @@ _BUILT = (
     "render_mode", "_camera", "_size", "spec", "metadata",
     "heating", "control_period", "interval", "repeats", "share",
 )  # fmt: skip
-HEATINGS = ("temperature", "power")
+HEATINGS = ("temperature", "power")  # what a number of an action means to a TCA
 
 
 class TaskArguments(TypedDict, total=False):

@@ -321,5 +321,5 @@ def _period(control_period: float, timestep: float) -> float:
     return control_period / updates
 
 
-TetrapodGaitVector = partial(TaskVector, TetrapodGait)
+TetrapodGaitVector = partial(TaskVector, TetrapodGait)  # several, stepped together
 """Several of them as one vector environment, made by ``gymnasium.make_vec``."""

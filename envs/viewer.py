@@ -167,6 +167,13 @@ def launch(
     The environment variable ``MUJOCO_GL`` is set to ``glfw`` for this process: a window cannot be
     had otherwise, and dm_control reads it when it is imported.
 
+    Args:
+        env: A task of this package.
+        policy: Who acts.
+        seed: Seed of the first episode; the others follow.
+        options: Options of every reset.
+        title: Title of the window.
+
     Raises:
         NoDisplay: If no window can be opened.
     """

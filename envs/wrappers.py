@@ -30,7 +30,10 @@ class ScaledObservation(
     """
 
     def __init__(self, env: gym.Env[Observation, Any]) -> None:
-        """Wraps ``env``.
+        """Wraps a task.
+
+        Args:
+            env: What ``gymnasium.make`` makes of a task.
 
         Raises:
             ValueError: If it is no task of this package.
@@ -49,7 +52,10 @@ class VectorScaledObservation(VectorWrapper):
     """``ScaledObservation`` of a vector environment, in every autoreset mode."""
 
     def __init__(self, env: TaskVector) -> None:
-        """Wraps what ``gymnasium.make_vec`` makes of a task.
+        """Wraps several tasks.
+
+        Args:
+            env: What ``gymnasium.make_vec`` makes of a task.
 
         Raises:
             ValueError: If its tasks are none of this package.

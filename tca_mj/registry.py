@@ -40,6 +40,7 @@ class Task:
         return f"{self.entry_point}Vector"
 
 
+# The tasks of this package.
 TASKS = (
     Task(
         id="TCA/ArmPickPlace-v0",
@@ -114,6 +115,9 @@ def find_task(task: str) -> EnvSpec:
 
 def task_class(task: str) -> Any:
     """The class of a task, a ``tca_mj.envs.task.SimulatedTask``.
+
+    Args:
+        task: Gymnasium id, or ``module:id``.
 
     Raises:
         ValueError: As ``find_task``, or if it is none.

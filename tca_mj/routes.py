@@ -106,8 +106,13 @@ class Route(Protocol):
 def parallel(count: int, radius: float, phase: float = 0.0) -> tuple[Helix, ...]:
     """Routes of ``count`` straight TCAs at equal angles round the centre line.
 
+    Args:
+        count: Number of TCAs, at least 1.
+        radius: Their distance to the centre line, not negative [m].
+        phase: Angle of the first one, from the cross-section's x axis towards y [rad].
+
     Raises:
-        ValueError: If the count is below one.
+        ValueError: If a number is out of range.
     """
     require_count(count=count)
     return tuple(Helix(radius, phase=phase + 2.0 * np.pi * i / count) for i in range(count))

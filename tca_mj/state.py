@@ -88,6 +88,10 @@ def set_state(sim: Simulation, state: SimulationState) -> None:
 
     From there it goes, bit for bit, where the other one went.
 
+    Args:
+        sim: The simulation, which is changed.
+        state: The state, as ``get_state`` returns it.
+
     Raises:
         ValueError: If the simulation was built of another part.
     """

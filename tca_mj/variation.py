@@ -103,7 +103,11 @@ class Nominal:
     """
 
     def __init__(self, sim: Simulation) -> None:
-        """Keeps the figures of ``sim``, to which no variation has been applied."""
+        """Keeps the figures of a simulation.
+
+        Args:
+            sim: The simulation, to which no variation has been applied.
+        """
         self._sim = sim
         self._figures = {
             name: getattr(sim.model, name).copy() for name in _MASSES + _INVERSE + _FRICTION

@@ -79,6 +79,9 @@ def arguments_of(name: str | Path, task: str) -> dict[str, Any]:
 def scripted(env: Any) -> Policy:
     """The scripted policy of an environment's task.
 
+    Args:
+        env: The environment.
+
     Raises:
         ValueError: If it has none, or the task was not made with ``scripted_arguments``.
     """
@@ -121,7 +124,14 @@ def first_gait(task: str, start: str) -> tuple[Gait, tuple[float, ...]]:
 
 
 def best_of(name: str | Path) -> str | Path:
-    """The file of the best policy, if ``name`` is the folder of a training run; else ``name``."""
+    """The file of the best policy, if ``name`` is the folder of a training run; else ``name``.
+
+    Args:
+        name: Folder of a run, or whatever else a policy is called by.
+
+    Raises:
+        FileNotFoundError: If the folder has no policy yet.
+    """
     if not Path(name).is_dir():
         return name
     found = [path for path in map(Path(name).joinpath, ("best.json", "best.npz")) if path.is_file()]

@@ -188,7 +188,11 @@ class SavedPolicy:
 
 @dataclass(slots=True)
 class NetworkPolicy:
-    """A network that acts on what it sees."""
+    """A network that acts on what it sees.
+
+    Attributes:
+        network: The network.
+    """
 
     network: Network
     phase = "network"
@@ -227,7 +231,15 @@ class ResidualPolicy:
 
 
 def with_clock(observation: NDArray[np.float32], walker: GaitPolicy) -> NDArray[np.float32]:
-    """The observation, and sine and cosine of the gait's phase behind it."""
+    """The observation, and sine and cosine of the gait's phase behind it.
+
+    Args:
+        observation: What is seen, shape (n,).
+        walker: The gait.
+
+    Returns:
+        Shape (n + 2,) [1].
+    """
     angle = 2.0 * np.pi * walker.cycle
     return np.append(observation, np.array([np.sin(angle), np.cos(angle)], dtype=np.float32))
 
@@ -263,6 +275,10 @@ def load_policy(source: str | Path, env: Any) -> Policy:
 def require_arguments(arguments: Mapping[str, Any], env: Any) -> None:
     """Refuses an environment that was made with other arguments than a policy needs.
 
+    Args:
+        arguments: What the policy needs.
+        env: The environment.
+
     Raises:
         ValueError: If one of ``action`` and ``control_period`` differs.
     """
@@ -277,7 +293,14 @@ def require_arguments(arguments: Mapping[str, Any], env: Any) -> None:
 
 
 def find(source: str | Path) -> Path:
-    """The file of a policy; see ``load_policy``."""
+    """The file of a policy.
+
+    Args:
+        source: A file, or the name of one of ``shipped``.
+
+    Raises:
+        FileNotFoundError: If there is none.
+    """
     path = Path(source)
     if path.is_file():
         return path

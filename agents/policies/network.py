@@ -23,10 +23,10 @@ class Network(Checked):
     Attributes:
         weights: One matrix per layer, shape (out, in), float32.
         biases: One row per layer, shape (out,), float32.
-        mean: Of each number of the observation, shape (in,), float64.
-        var: Variance of each, shape (in,), float64.
-        clip: Largest size of a normalised number.
-        epsilon: Added to the variance.
+        mean: Of each number of the observation, shape (in,), float64 [their units].
+        var: Variance of each, shape (in,), float64 [their units squared].
+        clip: Largest size of a normalised number [1].
+        epsilon: Added to the variance [as ``var``].
         activation: ``tanh`` or ``relu``.
         squash: ``clip`` (what is beyond ±1 is cut off) or ``tanh``.
 

@@ -18,6 +18,7 @@ from tca_mj.tca.spec import heat_of
 
 Array = NDArray[np.float64]
 
+# Names of the phases, in order.
 PHASES = ("align", "open", "lower", "pinch", "lift", "turn back", "bend", "release", "done")
 
 _DT = ArmPickPlace.control_period
@@ -40,7 +41,7 @@ class PickAndPlaceGains:
         wrist_slope: Rise of temperature that turns the wrist by one radian [K/rad].
         opening_slope: Rise of temperature that opens the gripper by one metre [K/m].
         clearance: Opening beyond the object's width [m].
-        grasp_depth: How far below the object's centre the finger tips close, over its width.
+        grasp_depth: How far below the object's centre the finger tips close, over its width [1].
         aligned: Offset of the gripper with which it goes down [m].
         aligned_yaw: Misalignment of the wrist with which it goes down [rad].
         over_cup: Offset of the object from the cup's axis at which it is let go [m].

@@ -89,7 +89,11 @@ class Bend:
 
 
 def stages(places: Places) -> tuple[Go | Bend, ...]:
-    """The course, stage by stage."""
+    """The course, stage by stage.
+
+    Args:
+        places: Where things are along it.
+    """
     station, edge, end = places.leg_station, places.first_edge, places.beam_end
     walking, wide = np.radians(95.0), np.radians(115.0)
     return (
@@ -125,7 +129,10 @@ class CourseWalker:
     stalled = 35.0  # time without headway after which another gait is tried [s]
 
     def __init__(self, env: TetrapodCourse) -> None:
-        """A controller for ``env``, of which it uses limits and places, not the state.
+        """Reads limits and places of a task, never its state.
+
+        Args:
+            env: The task.
 
         Raises:
             ValueError: If the action is not the power of the TCAs.

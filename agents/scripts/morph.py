@@ -64,7 +64,7 @@ class MorphPolicy:
     """
 
     module_spec: MorphingSpec = field(default_factory=MorphingSpec)
-    gains: PiSpec = GAINS
+    gains: PiSpec = field(default_factory=lambda: GAINS)
     progress: MorphState | None = None
 
     def __post_init__(self) -> None:

@@ -35,7 +35,7 @@ SHIMMY = Gait(
 )  # fmt: skip
 """Front and rear pair clamp the beam by turns, like a caterpillar."""
 
-GAITS = MappingProxyType({"crawl": CRAWL, "walk": WALK, "shimmy": SHIMMY})
+GAITS = MappingProxyType({"crawl": CRAWL, "walk": WALK, "shimmy": SHIMMY})  # by task
 
 # The side that is to be turned to makes shorter strokes. Estimates that hold the direction.
 STEERING = {"crawl": 600.0, "walk": 600.0, "shimmy": 0.0}

@@ -32,12 +32,12 @@ class OnPolicy(Checked):
         n_steps: Steps of each environment between two updates.
         batch_size: Of the gradient.
         n_epochs: Passes over what was collected.
-        learning_rate: Of Adam.
-        gamma: Discount per step.
-        gae_lambda: Of the advantage.
-        clip_range: Of the probability ratio.
-        ent_coef: Weight of the entropy.
-        log_std_init: Logarithm of the standard deviation of the first actions.
+        learning_rate: Of Adam [1].
+        gamma: Discount per step [1].
+        gae_lambda: Of the advantage [1].
+        clip_range: Of the probability ratio [1].
+        ent_coef: Weight of the entropy [1].
+        log_std_init: Logarithm of the standard deviation of the first actions [1].
         hidden: Widths of the hidden layers of actor and critic, with tanh.
     """
 
@@ -63,10 +63,10 @@ class OffPolicy(Checked):
         train_freq: Steps of each environment between two updates.
         gradient_steps: Gradient steps of each update.
         batch_size: Of the gradient.
-        learning_rate: Of Adam.
-        gamma: Discount per step.
-        tau: Share by which the target network follows.
-        noise: Standard deviation of TD3's actions; SAC finds its own.
+        learning_rate: Of Adam [1].
+        gamma: Discount per step [1].
+        tau: Share by which the target network follows [1].
+        noise: Standard deviation of TD3's actions [1]; SAC finds its own.
         hidden: Widths of the hidden layers of actor and critics, with ReLU.
     """
 

@@ -44,11 +44,11 @@ class SearchConfig(Checked):
         steps: Control steps of all episodes together after which no generation begins.
         seed: Seed of everything that is drawn.
         start: Where the search begins: ``scripted``, ``trot``, or a policy's file or name.
-        sigma: First step size, the cube of all gaits having edges of 1. With 0.03 one in five
+        sigma: First step size, the cube of all gaits having edges of 1 [1]. With 0.03 one in five
             gaits about the scripted walk is better than it, with 0.1 none.
         population: Gaits per generation.
         episodes: Episodes per gait, the same for all of a generation.
-        randomise: Spread of the robots in them.
+        randomise: Spread of the robots in them, a share [1].
         settling: Time of each episode that is not judged, as in ``Trial`` [s].
         window: Time that is judged [s].
         validate_every: Generations after which the middle of the search is judged, by the same

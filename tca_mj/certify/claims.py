@@ -59,7 +59,7 @@ _BENT: Sequence[tuple[str, Sequence[Route], Sequence[float], Vector]] = (
 
 @dataclass(frozen=True, slots=True)
 class Claim:
-    """One statement.
+    """One statement about theory or chain, and whether it holds.
 
     Attributes:
         group: What it is about.

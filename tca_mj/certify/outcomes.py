@@ -40,6 +40,7 @@ class Effort(NamedTuple):
     solvers: int = 20
 
 
+# What ``tca-mj certify`` does.
 FULL = Effort()
 
 
@@ -65,7 +66,7 @@ class Outcome:
         split: Where these found two different states instead: how far the chain's state next to
             that of "energy" is from it [1].
         failure: Why there is no gap.
-        seconds: Processor time.
+        seconds: Processor time [s].
     """
 
     temperature: tuple[float, ...]

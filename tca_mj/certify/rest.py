@@ -54,7 +54,7 @@ class Rest(NamedTuple):
 
     Attributes:
         position: Places of the tips in the same frame, shape (t, 3) [m].
-        rotation: Their frames, shape (t, 3, 3).
+        rotation: Their frames, columns x, y, z, shape (t, 3, 3) [1].
         length: Lengths of the TCAs along their routes, shape (n,) [m].
         tension: Their tensions, shape (n,) [N].
     """

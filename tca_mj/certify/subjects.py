@@ -204,6 +204,7 @@ def _arm(spec: ArmSpec) -> Subject:
     )  # fmt: skip
 
 
+# What is certified, made when it is asked for, by name.
 SUBJECTS: Mapping[str, Callable[[], Subject]] = MappingProxyType({
     "bending": lambda: _bending(BendingSpec()),
     "twisting": lambda: _twisting(TwistingSpec()),

@@ -13,8 +13,8 @@ from typing import Any, TypeAlias
 
 from tca_mj.registry import DEMOS, TASKS, find_task
 
-POLICIES = ("scripted", "off", "random")
-ALGORITHMS = ("cma", "ppo", "sac", "td3")
+POLICIES = ("scripted", "off", "random")  # who acts besides saved policies
+ALGORITHMS = ("cma", "ppo", "sac", "td3")  # what ``tca-mj train`` learns by
 
 Commands: TypeAlias = "argparse._SubParsersAction[argparse.ArgumentParser]"
 

@@ -87,7 +87,11 @@ def _demo(arguments: argparse.Namespace) -> int:
 
 
 def outcome(summary: dict[str, Any]) -> str:
-    """One line on how a demo ended, from its summary."""
+    """One line on how a demo ended.
+
+    Args:
+        summary: What ``tca_mj.agents.play`` returns.
+    """
     energy = sum(summary["energy"].values()) + sum(summary["heater_energy"].values())
     return (
         f"{summary['policy']} in {summary['task']}: {summary['ending']} after"
@@ -98,7 +102,11 @@ def outcome(summary: dict[str, Any]) -> str:
 
 
 def speed_table(summary: dict[str, Any]) -> str:
-    """Headway of a demo's phases against what is published, as Markdown."""
+    """Headway of a demo's phases against what is published, as Markdown.
+
+    Args:
+        summary: What ``tca_mj.agents.play`` returns of a robot that gets on.
+    """
     rows = [
         [row["name"], f"{phase['duration']:.0f} s", f"{1e3 * row['distance']:.0f} mm",
          *("" if speed is None else f"{1e3 * speed:.2f} mm/s"

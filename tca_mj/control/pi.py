@@ -26,13 +26,14 @@ class PiSpec(Checked):
     """Gains and limits, scalars or arrays that broadcast with the errors (..., n).
 
     Attributes:
-        proportional: K_P, output per error, not negative.
-        integral: K_I, output per error and second, not negative.
-        lowest: Lower limit of the output.
-        highest: Upper limit, above the lower one.
-        near: Size of the error from which on ``near_proportional`` holds, for good; 0 is never.
-        near_proportional: K_P from then on, not negative.
-        near_integral: K_I from then on; None is the same as before.
+        proportional: K_P, not negative [unit of the output / unit of the error].
+        integral: K_I, not negative [the same / s].
+        lowest: Lower limit of the output [its unit].
+        highest: Upper limit, above the lower one [its unit].
+        near: Size of the error from which on ``near_proportional`` holds, for good; 0 is never
+            [unit of the error].
+        near_proportional: K_P from then on, not negative [as before].
+        near_integral: K_I from then on; None is the same as before [as before].
     """
 
     proportional: NotNegatives
@@ -56,7 +57,7 @@ class PiState:
     """State of n controllers, each array of shape (..., n).
 
     Attributes:
-        integral: Integral part of the output.
+        integral: Integral part of the output [unit of the output].
         arrived: Whether the error has been as small as ``near`` once.
     """
 
@@ -65,7 +66,11 @@ class PiState:
 
 
 def pi_rest(shape: tuple[int, ...] = ()) -> PiState:
-    """State before the first step."""
+    """State before the first step.
+
+    Args:
+        shape: Shape of the errors, (..., n).
+    """
     return PiState(np.zeros(shape), np.zeros(shape, dtype=bool))
 
 
@@ -75,7 +80,7 @@ def pi_step(spec: PiSpec, state: PiState, error: ArrayLike, dt: float) -> tuple[
     Args:
         spec: Gains and limits.
         state: State before the step, shape (..., n).
-        error: Goal minus measurement, a shape that broadcasts with it.
+        error: Goal minus measurement, a shape that broadcasts with it [any unit].
         dt: Time since the last step, above 0 [s].
 
     Returns:

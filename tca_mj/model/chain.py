@@ -24,8 +24,9 @@ from tca_mj.model.surface import surface
 from tca_mj.rod.beam import BeamSpec, Outline
 from tca_mj.rod.lie import quaternion_exp, quaternion_matrix
 
+# What a joint of a chain lets its two pieces do.
 Motion = Literal["stretch", "bend_x", "bend_y", "twist"]
-MOTIONS: tuple[Motion, ...] = ("stretch", "bend_x", "bend_y", "twist")
+MOTIONS: tuple[Motion, ...] = ("stretch", "bend_x", "bend_y", "twist")  # all of them
 
 # Axis of each motion in the piece's frame, z along the beam.
 _AXIS = {"stretch": (0, 0, 1), "bend_x": (1, 0, 0), "bend_y": (0, 1, 0), "twist": (0, 0, 1)}

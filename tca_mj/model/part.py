@@ -66,6 +66,9 @@ def new_spec(name: str) -> mujoco.MjSpec:
 
     The ``discrete`` integrator takes springs, dampers and affine actuators implicitly and is
     stable at any time step; see the page on soft bodies in the documentation.
+
+    Args:
+        name: Name of the model.
     """
     spec = mujoco.MjSpec()
     spec.modelname = name
@@ -75,7 +78,11 @@ def new_spec(name: str) -> mujoco.MjSpec:
 
 
 def set_options(spec: mujoco.MjSpec) -> None:
-    """Gives a specification the solver settings of ``new_spec``, and radians."""
+    """Gives a specification the solver settings of ``new_spec``, and radians.
+
+    Args:
+        spec: The specification, which is changed.
+    """
     spec.compiler.degree = False
     option = spec.option
     # A diverged state stays as it is, for the one who asks what happened.

@@ -13,6 +13,9 @@ from tca_mj.model.part import Part, set_options
 def load(path: Path) -> mujoco.MjSpec:
     """Reads an MJCF file into a specification.
 
+    Args:
+        path: The file.
+
     Raises:
         ValueError: If the file does not exist or is no MJCF.
     """

@@ -106,7 +106,7 @@ def sheath(spec: SpineSpec, share: float, **more: Any) -> BeamSpec:
     Args:
         spec: A spine.
         share: Stiffness of what is round the spines against bending and twist, over that of one
-            soft spine.
+            soft spine [1].
         **more: The other fields of the beam.
     """
     soft = share * spec.smp.rubbery * spec.second_moment

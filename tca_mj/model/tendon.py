@@ -89,7 +89,12 @@ class RoutedTca:
 
 
 def route_passes(chain: Chain, route: Route) -> tuple[Pass, ...]:
-    """The passes of a route through one chain: up along the first leg, down the second, ..."""
+    """The passes of a route through one chain: up along the first leg, down the second, ...
+
+    Args:
+        chain: The chain.
+        route: The route.
+    """
     return tuple(Pass(chain, leg, down=bool(i % 2)) for i, leg in enumerate(route.legs))
 
 
@@ -155,12 +160,23 @@ def route_tca(
 def lay_tca(
     spec: mujoco.MjSpec, tca: TcaSpec, passes: Sequence[Pass], *, name: str, ideal: bool = False
 ) -> RoutedTca:
-    """``route_tca`` of a TCA cut to the length of its passes."""
+    """``route_tca`` of a TCA cut to the length of its passes, which raises the errors.
+
+    Args:
+        spec: Specification the chains were built in.
+        tca: The kind of TCA.
+        passes: Where it runs.
+        name: Its name.
+        ideal: Whether it is without mass and may leave the body's outline.
+    """
     return route_tca(spec, tca.of_length(path_length(passes)), passes, name=name, ideal=ideal)
 
 
 def path_length(passes: Sequence[Pass]) -> float:
     """Length of a route in the unloaded bodies [m].
+
+    Args:
+        passes: Where it runs.
 
     Raises:
         ValueError: If it has no leg.

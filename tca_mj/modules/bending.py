@@ -20,7 +20,13 @@ SILICONE_SHEAR = SILICONE_YOUNG / 3.0  # incompressible, Sun, Section 5.3 [Pa]
 
 
 def silicone_cylinder(length: float, diameter: float, outer_diameter: float) -> BeamSpec:
-    """A cylinder of Ecoflex 00-30: the section that carries load, and the body that is seen [m]."""
+    """A cylinder of Ecoflex 00-30.
+
+    Args:
+        length: Length [m].
+        diameter: Diameter of the section that carries load [m].
+        outer_diameter: Diameter of the body that is seen and touched, and holds the TCAs [m].
+    """
     return BeamSpec.circular(
         length=length, diameter=diameter, outer_diameter=outer_diameter,
         young=SILICONE_YOUNG, shear=SILICONE_SHEAR, density=SILICONE_DENSITY,
@@ -102,6 +108,9 @@ class BendingSpec(Checked):
 
 def bending_module(spec: BendingSpec | None = None) -> Part:
     """Builds the module: base at the origin, axis along z, TCA 0 on the x side.
+
+    Args:
+        spec: The module, by default the published one.
 
     Returns:
         A part with the TCAs ``tca0``, ``tca1``, ... and the site ``tip``.

@@ -47,7 +47,7 @@ class FingerPairSpec(Checked):
             turn closes the ring.
         nodes: Nodes of each finger. With 8 its tip lies within 1 % of a finger's length of theory,
             opened to a straight body too.
-        friction: Sliding friction of the silicone. Estimate.
+        friction: Coefficient of sliding friction of the silicone [1]. Estimate.
         tca: The kind of TCA, cut to the route's length in the closed gripper. It lies on
             half the wall of its bent channel.
 
@@ -113,6 +113,9 @@ def finger_pair(spec: FingerPairSpec | None = None) -> Part:
     """Builds the gripper: held at the origin, the fingers in the x-z plane, their tips below z.
 
     The z axis of the base points from the mount to where the finger tips meet.
+
+    Args:
+        spec: The gripper, by default the published one.
 
     Returns:
         A part with the TCA ``tca`` and the sites ``tip0``, ``tip1`` (finger tips) and ``grasp``

@@ -90,6 +90,9 @@ class MorphingSpec(Checked):
 def morphing_module(spec: MorphingSpec | None = None) -> Part:
     """Builds the module: clamped at the origin, straight along z, memorised straight.
 
+    Args:
+        spec: The module, by default the published one.
+
     Returns:
         A part with the TCA ``tca``, the spine ``spine``, the site ``tip`` and the body ``tip``
         at the same place: an external force on it acts on the end of the spine's axis.

@@ -79,6 +79,9 @@ class TwistingSpec(Checked):
 def twisting_module(spec: TwistingSpec | None = None) -> Part:
     """Builds the module: base at the origin, axis along z.
 
+    Args:
+        spec: The module, by default the published one.
+
     Returns:
         A part with the TCA ``tca`` and the site ``tip``.
 

@@ -31,7 +31,7 @@ class Film(Closing):
             simulation: What to film.
             path: File to write, ending ``.mp4``; its folder is made if it is missing.
             fps: Frames per second of the film [1/s].
-            speed: Simulated seconds per second of film.
+            speed: Simulated seconds per second of film [1].
             width: Width, a multiple of 16 [pixels].
             height: Height, a multiple of 16 [pixels].
             camera: As in ``Offscreen``.

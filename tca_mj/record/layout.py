@@ -12,6 +12,7 @@ from tca_mj.checks import Array
 from tca_mj.record.plots import series_colours
 from tca_mj.record.shapes import rgba_bytes
 
+# What is recorded of each TCA, with its title and unit.
 QUANTITIES = {
     "power": "Power [W]",
     "temperature": "Temperature [°C]",

@@ -75,7 +75,7 @@ def series_colours(n: int, *, lightness: float = 0.62) -> Array:
 
     Args:
         n: Number of colours.
-        lightness: Mean OKLab lightness, 0 to 1: about 0.6 on white, 0.75 on black.
+        lightness: Mean OKLab lightness, 0 to 1: about 0.6 on white, 0.75 on black [1].
 
     Returns:
         sRGB in [0, 1], shape (n, 3).

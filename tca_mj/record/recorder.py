@@ -57,15 +57,24 @@ class Recorded(Watched, Protocol):
     """
 
     @property
-    def tca_names(self) -> tuple[str, ...]: ...
+    def tca_names(self) -> tuple[str, ...]:
+        """Names of the TCAs."""
+
     @property
-    def power(self) -> Array: ...
+    def power(self) -> Array:
+        """Electrical power [W]."""
+
     @property
-    def tension(self) -> Array: ...
+    def tension(self) -> Array:
+        """Tension [N]."""
+
     @property
-    def length(self) -> Array: ...
+    def length(self) -> Array:
+        """Length [m]."""
+
     @property
-    def resistance(self) -> Array: ...
+    def resistance(self) -> Array:
+        """Electrical resistance [ohm]."""
 
 
 class Recorder(Closing):

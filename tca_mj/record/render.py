@@ -62,15 +62,24 @@ class Watched(Protocol):
     """What a camera needs of a simulation; ``tca_mj.sim.Simulation`` has it."""
 
     @property
-    def model(self) -> mujoco.MjModel: ...
+    def model(self) -> mujoco.MjModel:
+        """Compiled model."""
+
     @property
-    def data(self) -> mujoco.MjData: ...
+    def data(self) -> mujoco.MjData:
+        """MuJoCo's state."""
+
     @property
-    def time(self) -> float: ...
+    def time(self) -> float:
+        """Simulated time [s]."""
+
     @property
-    def tendon(self) -> NDArray[Any]: ...
+    def tendon(self) -> NDArray[Any]:
+        """Ids of the TCAs' tendons, shape (n,)."""
+
     @property
-    def temperature(self) -> NDArray[np.float64]: ...
+    def temperature(self) -> NDArray[np.float64]:
+        """Temperature of each TCA, shape (n,) [°C]."""
 
 
 def gl_backend() -> str:

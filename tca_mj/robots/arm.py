@@ -62,6 +62,9 @@ def arm(spec: ArmSpec | None = None) -> Part:
     The slide's position is the height above the ground. It is driven by the actuator ``lift``,
     whose control is a velocity [m/s].
 
+    Args:
+        spec: The arm, by default the published one.
+
     Returns:
         A part with the TCAs ``bending.tca0`` to ``bending.tca2``, ``wrist.tca`` and
         ``gripper.tca``, in this order, and the sites ``bending.tip``, ``wrist.tip``,

@@ -32,9 +32,9 @@ from tca_mj.smp import HeaterSpec, SpineSpec
 from tca_mj.smp.lumped import in_tube
 from tca_mj.tca import CATALOGUE, TcaSpec
 
-LEGS = ("front_left", "front_right", "rear_left", "rear_right")
+LEGS = ("front_left", "front_right", "rear_left", "rear_right")  # names, in order
 SIDES = {"left": 1.0, "right": -1.0}  # the sign of y
-SPINES = 3
+SPINES = 3  # how many
 
 _Bend = Annotated[float, partial(number, above=-math.pi, below=math.pi, unit="rad")]
 # Stiffness of what is round a spine (tube, wires) over that of the soft spine. Estimate.
@@ -108,6 +108,9 @@ class TetrapodSpec(Checked):
 
 def tetrapod(spec: TetrapodSpec | None = None) -> Part:
     """Builds the robot: the middle of the spines at the origin, on a free joint ``root``.
+
+    Args:
+        spec: The robot, by default the published one as far as it is known.
 
     Returns:
         A part with the TCAs ``<leg>.tca0`` (lifts the leg), ``<leg>.tca1`` (front, down) and

@@ -164,6 +164,10 @@ def torsion_constant(width: float, height: float) -> float:
 
     J = a b³ (1/3 - 64/π⁵ b/a Σ tanh(nπa/2b)/n⁵), n odd, a the longer side
     (Timoshenko & Goodier, Theory of Elasticity, section 109).
+
+    Args:
+        width: One side [m].
+        height: The other side [m].
     """
     longer, shorter = max(width, height), min(width, height)
     n = np.arange(1, 40, 2, dtype=np.float64)

@@ -39,7 +39,7 @@ class Segment(Checked):
         routes: Routes of the k strands, which are weightless.
         tensions: For each of them its tension, at least 0 [N], or its law.
         rotation: Axes of the base, as columns, in the frame of the previous segment's tip (of the
-            world for the first segment), shape (3, 3).
+            world for the first segment), shape (3, 3) [1].
         offset: Position of the base in that frame, shape (3,) [m].
         mass: Rigid mass at the tip [kg].
         centre: Centre of that mass in the tip's frame, shape (3,) [m].

@@ -18,7 +18,7 @@ class RodShape:
 
     Attributes:
         position: Points of the centre line, shape (n, 3) [m].
-        rotation: Frames of the sections as matrices, columns x, y, z, shape (n, 3, 3).
+        rotation: Frames of the sections as matrices, columns x, y, z, shape (n, 3, 3) [1].
         arc_length: Position of the points along the unloaded centre line, shape (n,) [m].
         strain: Twist of the centre line in the section's frame, angular u [1/m] then linear v,
             u the curvature at rest and v = (0, 0, 1) if nothing pulls, shape (n, 6); or None.

@@ -42,6 +42,11 @@ class SpineBank:
     ) -> None:
         """Combines the spines.
 
+        Args:
+            specs: The n spines.
+            heaters: Their heaters.
+            owner: Index of each joint's spine, shape (m,).
+
         Raises:
             ValueError: If there is no spine, the numbers differ, the materials differ, or an
                 owner does not exist.

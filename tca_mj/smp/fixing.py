@@ -117,6 +117,11 @@ def stored_energy(smp: SmpSpec, state: SpineState, angle: ArrayLike) -> Array:
     ½ E_r (q - memory)² + ½ E_g (q - frozen)²; what layers of glass frozen at different angles
     store against each other is not in it, because it never does work.
 
+    Args:
+        smp: The material.
+        state: State of the joints, shape (..., n).
+        angle: Their angles q, shape (..., n) [rad].
+
     Raises:
         ValueError: If an angle is not finite.
     """

@@ -84,7 +84,14 @@ class LumpedModule:
     def __init__(
         self, spine: SpineSpec, heater: HeaterSpec, tca: TcaSpec, damage: DamageSpec | None = None
     ) -> None:
-        """Combines a spine, its heater and a TCA of about twice the spine's length."""
+        """Combines a spine and its TCA.
+
+        Args:
+            spine: The spine.
+            heater: Its heater.
+            tca: The TCA, of about twice the spine's length.
+            damage: Bounds of the damage rule, by default those of ``DamageSpec``.
+        """
         self.spine = spine
         self.heater = heater
         self.bank = TcaBank([tca])

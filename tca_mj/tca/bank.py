@@ -28,7 +28,7 @@ class Signal(NamedTuple):
 
     Attributes:
         unit: Unit, ``-`` for none.
-        values: Numbers, shape (..., n).
+        values: Numbers, shape (..., n) [``unit``].
     """
 
     unit: str

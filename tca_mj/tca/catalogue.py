@@ -98,6 +98,7 @@ FREE_STROKE_CREPT: Mapping[str, TcaSpec] = MappingProxyType(
     }
 )
 
+# Published TCAs by name, as long as they were made.
 CATALOGUE: Mapping[str, TcaSpec] = MappingProxyType(
     {
         # The contact length of type 0 follows from its free stroke of 5.7 %: the coils must touch
@@ -119,6 +120,7 @@ CATALOGUE: Mapping[str, TcaSpec] = MappingProxyType(
 # themselves and add the sheath; these entries are bare and say what is printed.
 _THREAD = CATALOGUE["free-stroke"]
 
+# TCAs of the modules and experiments, cut to length, by where they are found.
 MODULE_TCAS: Mapping[str, TcaSpec] = MappingProxyType(
     {
         # Table 2.3, self-sensing and control: 350 mm of thread, 110 mm natural, 133.5 mm made,

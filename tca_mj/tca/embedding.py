@@ -70,7 +70,14 @@ def silicone_body(
 def in_silicone(
     tca: TcaSpec, *, section: float, perimeter: float, touching: float = 0.0
 ) -> TcaSpec:
-    """A TCA with the silicone round it; arguments and errors as ``silicone_body``."""
+    """A TCA with the silicone round it; errors as ``silicone_body``.
+
+    Args:
+        tca: The TCA.
+        section: Cross-section of the silicone that belongs to each of its strands [m²].
+        perimeter: Length of its outline that air touches [m].
+        touching: Share of the TCA's circumference that lies on the wall, 0 to 1 [1].
+    """
     body = silicone_body(tca, section=section, perimeter=perimeter, touching=touching)
     return replace(tca, body=body)
 

@@ -21,6 +21,14 @@ class FibreTable(NamedTuple):
     """What the laws of this file need of n fibres, each field an array of shape (n,).
 
     Field by field this is the ``FibreSpec`` attribute of the same name.
+
+    Attributes:
+        reference_temperature: Temperature T_0 of the natural shape [°C].
+        inserted_twist: Twist per fibre length [rad/m].
+        untwist_scale: Factor on the untwist [1].
+        growth: (a2, a1) of the relative growth of the radius [1/K^2, 1/K].
+        softening_rate: Relative fall of the moduli per kelvin [1/K].
+        load_softening: Coefficients (mu2, mu1, mu0) of the load's influence on it.
     """
 
     reference_temperature: Array

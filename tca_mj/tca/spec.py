@@ -40,7 +40,7 @@ class FibreSpec(Checked):
             fitted to three loads of the free-stroke TCA up to 60 g (tau = 171 rad/m) and is
             an extrapolation beyond.
         inserted_twist: Twist inserted before annealing, per fibre length [rad/m].
-        untwist_scale: Factor on the untwist, 1 unless a coil was fitted with another.
+        untwist_scale: Factor on the untwist, 1 unless a coil was fitted with another [1].
         expansion: Coefficients (c2, c1, c0) of the ratio of hot to cold fibre radius,
             Gamma(T) = c2 T^2 + c1 T + c0 with T in °C, Sun, Section 3.1.2. The constant term
             is the one near 1. The laws divide Gamma by its value at the
@@ -151,9 +151,9 @@ class TcaSpec(Checked):
             is one number here, and the same for all TCAs of this thread [W/(m K)].
         ambient: Temperature of the surroundings [°C].
         body: The soft body that the TCA lies in and gives its heat to; None for a bare TCA.
-        contact_ratio: Stiffness of touching coils over that of the cold coil: an estimate.
+        contact_ratio: Stiffness of touching coils over that of the cold coil: an estimate [1].
         contact_smoothing: Range over which the contact sets in, as a share of the minimum
-            length: an estimate.
+            length: an estimate [1].
     """
 
     fibre: FibreSpec

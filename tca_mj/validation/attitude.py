@@ -42,8 +42,8 @@ class Bend(NamedTuple):
     """A bend of constant curvature, in radians.
 
     Attributes:
-        angle: From 0 to π.
-        direction: Of the bend, from x towards y; 0 for a straight module.
+        angle: From 0 to π [rad].
+        direction: Of the bend, from x towards y; 0 for a straight module [rad].
     """
 
     angle: float
@@ -55,6 +55,10 @@ def arc(bend: Bend, length: float) -> Array:
 
     L/θ (cos γ (1 - cos θ), sin γ (1 - cos θ), sin θ): Sun, Section 4.1.3, where γ is counted from
     y and the third component has a misprinted cosine, by which a straight module has no length.
+
+    Args:
+        bend: Angle θ and direction γ.
+        length: Length L of the arc [m].
     """
     angle = bend.angle
     across = length * math.sin(angle / 2.0) * float(np.sinc(angle / (2.0 * math.pi)))
@@ -98,11 +102,11 @@ class Bent(NamedTuple):
     """The module after 2 s of power in an attitude, angles in degrees.
 
     Attributes:
-        cold: Bend by place before, at rest in that attitude.
-        tangent: Angle between the tip's axis and the base's.
-        place: Bend by place.
-        direction: Of the tip's place, from TCA 1 towards TCA 2.
-        leaning: Direction of the tip's axis, from TCA 1 towards TCA 2.
+        cold: Bend by place before, at rest in that attitude [°].
+        tangent: Angle between the tip's axis and the base's [°].
+        place: Bend by place [°].
+        direction: Of the tip's place, from TCA 1 towards TCA 2 [°].
+        leaning: Direction of the tip's axis, from TCA 1 towards TCA 2 [°].
         temperature: Temperatures of the three TCAs, shape (3,) [°C].
         line: Places along the module, base to tip, shape (k, 3) [m].
     """

@@ -19,6 +19,7 @@ from typing import Any, Literal, get_args
 
 from tca_mj import pages
 
+# What the numbers say of a fact; see the top of this file.
 Verdict = Literal["held", "missed", "trend held", "trend missed", "fitted", "not covered"]
 VERDICTS: tuple[Verdict, ...] = get_args(Verdict)
 _UNKNOWN = "No reason is known."
@@ -179,7 +180,11 @@ def finding(
 
 
 def table(findings: Iterable[Finding]) -> str:
-    """The findings as a table in Markdown, reasons not included: see ``reasons``."""
+    """The findings as a table in Markdown, reasons not included: see ``reasons``.
+
+    Args:
+        findings: The rows.
+    """
     rows = []
     for row in findings:
         verdict = f"**{row.verdict}**" if "missed" in row.verdict else row.verdict

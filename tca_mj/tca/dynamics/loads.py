@@ -69,7 +69,7 @@ class Heating(Checked):
 
     Attributes:
         source: Which quantity is held: "power" [W], "voltage" [V] or "current" [A].
-        value: Its value; a power is not negative.
+        value: Its value [W], [V] or [A]; a power is not negative.
         air: Factor on the heat transfer coefficient: 1 still air, above 1 blown air, above 0.
     """
 
@@ -110,7 +110,11 @@ class LoadState:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Course(LoadState):
-    """States over time: ``time`` of shape (k,), the others (k, ..., n)."""
+    """States over time: fields of ``LoadState``, shape (k, ..., n).
+
+    Attributes:
+        time: When, shape (k,) [s].
+    """
 
     time: Array
 

@@ -37,12 +37,12 @@ class FibreShape:
     Attributes:
         arc_length: Position along the unloaded fibre, shape (n,) [m].
         position: Points of the centre line, world frame, shape (n, 3) [m].
-        quaternion: Orientation of the sections, scalar first, shape (n, 4).
+        quaternion: Orientation of the sections, scalar first, shape (n, 4) [1].
         angular: Turn per length u in the section's frame, shape (n, 3) [rad/m].
-        linear: Stretch v in the section's frame, (0, 0, 1) if unloaded, shape (n, 3).
+        linear: Stretch v in the section's frame, (0, 0, 1) if unloaded, shape (n, 3) [1].
         moment: Internal moment m in the section's frame, shape (n, 3) [N m].
         force: Internal force n in the section's frame, shape (n, 3) [N].
-        residual: Largest residual of the scaled equations.
+        residual: Largest residual of the scaled equations [1].
         error: Estimated error of the end's position, NaN if only one mesh was solved [m].
     """
 
@@ -68,7 +68,14 @@ class FibreShape:
 
 
 class Stiffness(NamedTuple):
-    """Section of Sun, eq. (3.8): bending EI, torsion GJ [N m²], shear GA, stretch EA [N]."""
+    """Stiffness of a fibre's section, Sun, eq. (3.8).
+
+    Attributes:
+        bending: EI [N m²].
+        torsion: GJ [N m²].
+        shear: GA [N].
+        stretch: EA [N].
+    """
 
     bending: float
     torsion: float
@@ -117,7 +124,7 @@ def solve_fibre(
         temperature: Temperature [°C].
         force: Force at the fibre's end, world frame, shape (3,) [N].
         moment: Moment on the fibre's end, world frame, shape (3,); zero lets it spin [N m].
-        tolerance: Allowed error of the end's position over the fibre's length.
+        tolerance: Allowed error of the end's position over the fibre's length [1].
         intervals: Solves on one mesh of so many equal intervals, whatever its error. By default
             the mesh is refined until ``tolerance`` is met.
 

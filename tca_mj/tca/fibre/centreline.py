@@ -38,7 +38,7 @@ class Centreline(Checked):
         strain: u*(s): arc length, shape (n,) [m], to the turn per length of the frame in its own
             axes, shape (n, 3) [rad/m]; (0, curvature, torsion) for Frenet's frame.
         position: Where the fibre starts, world frame, shape (3,) [m].
-        rotation: Frame at the start, columns x, y, z, with z along the fibre, shape (3, 3).
+        rotation: Frame at the start, columns x, y, z, with z along the fibre, shape (3, 3) [1].
 
     Raises:
         ValueError: If the length is not above 0, or position and rotation are none.

@@ -95,6 +95,10 @@ class CreepBank:
     def __init__(self, specs: Sequence[TcaSpec], creep: CreepSpec | None = None) -> None:
         """Gathers the constants.
 
+        Args:
+            specs: The n TCAs at their natural lengths.
+            creep: Constants, by default those of ``CreepSpec``.
+
         Raises:
             ValueError: If ``specs`` is empty, or creep would leave no helix of a TCA.
         """
@@ -227,6 +231,10 @@ def hysteresis_damping(tca: TcaSpec, creep: CreepSpec) -> float:
 
     As ``Load.damping`` it turns stroke over temperature into a loop. A harmonic stroke of
     amplitude a and angular frequency w takes the work pi b w a^2 per cycle.
+
+    Args:
+        tca: The TCA.
+        creep: Constants, of which ``lag`` is used.
     """
     return creep.lag * float(CoilRods([tca]).rest_stiffness[0])
 
@@ -238,7 +246,7 @@ def aged(tca: TcaSpec, cycles: float, creep: CreepSpec) -> TcaSpec:
 
     Args:
         tca: The TCA when new.
-        cycles: Number n of heating cycles, not negative.
+        cycles: Number n of heating cycles, not negative [1].
         creep: Constants of ageing.
 
     Returns:

@@ -32,5 +32,6 @@ class TensionLaw(Protocol):
         """
 
 
+# A law by name, or what makes one for the n TCAs that it is given.
 LawChoice = Literal["rod", "surface"] | Callable[[Sequence[TcaSpec]], TensionLaw]
 """The name of a law, or what makes one of n specifications, as a class with ``specs`` does."""

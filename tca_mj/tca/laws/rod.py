@@ -105,6 +105,9 @@ class CoilRods:
     def __init__(self, specs: Sequence[TcaSpec]) -> None:
         """Gathers the constants.
 
+        Args:
+            specs: The n TCAs.
+
         Raises:
             ValueError: If ``specs`` is empty.
         """

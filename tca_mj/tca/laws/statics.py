@@ -50,25 +50,21 @@ def hanging_length(
     spin: Spin | None = None,
     scheme: Scheme = "implicit",
 ) -> Array:
-    """Length at which a TCA carries a load.
+    """Length at which a TCA carries a load [m], in the broadcast shape.
 
     Args:
         tca: The TCA.
-        temperature: Temperature, any shape, broadcast with ``load`` [°C].
+        temperature: Below the fibre's melting, broadcast with ``load`` [°C].
         load: Axial force, not negative, any shape [N].
         model: "rod", "love" or "cst".
-        spin: Whether an end is "free" to spin or both are "locked". None is what the model's own
-            equations assume: "locked" for "love", "free" for the others.
-        scheme: Where "cst" takes its coefficients: at the natural shape ("linear"), at the
-            deformed one ("implicit") or along the way ("path"). The other models ignore it.
-
-    Returns:
-        Length between the ends, the broadcast shape [m].
+        spin: Whether an end is "free" to spin or both are "locked"; None as
+            the model's own equations: "locked" for "love", else "free".
+        scheme: Where "cst" takes its coefficients: at the natural shape
+            ("linear"), the deformed one ("implicit"), on the way ("path").
 
     Raises:
-        ValueError: If a load is negative or needs a length beyond 98 % of the fibre's, or leaves
-            no modulus; if a temperature is not above absolute zero and below the fibre's
-            melting temperature, or leaves no modulus or no helix; if a name is unknown.
+        ValueError: If an argument is out of range, or leaves no modulus or no
+            helix, or stretches the coil beyond 98 % of the fibre's length.
         CoilSolveError: If the shape is not found.
     """
     if spin is None:

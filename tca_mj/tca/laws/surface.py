@@ -31,6 +31,15 @@ class CoilSurfaces:
     """
 
     def __init__(self, specs: Sequence[TcaSpec]) -> None:
+        """Calibrates the coils that have not been yet.
+
+        Args:
+            specs: The n TCAs.
+
+        Raises:
+            ValueError: If ``specs`` is empty.
+            CalibrationError: If no table follows the rod of one closely enough.
+        """
         self.rods = CoilRods(specs)
         self.n = self.rods.n
         known = {key: calibrate(tca) for key, tca in {id(tca): tca for tca in specs}.items()}

@@ -82,8 +82,8 @@ def pulse_mean(duty: ArrayLike, periods: ArrayLike, phase: ArrayLike = 0.0) -> A
 
     Args:
         duty: Share of a period that it is on, 0 to 1.
-        periods: Length of the window in periods, above 0, broadcast with it.
-        phase: Start of the window in periods, broadcast with it.
+        periods: Length of the window, above 0, broadcast with it [periods].
+        phase: Start of the window, broadcast with it [periods].
 
     Returns:
         Share, the broadcast shape [1].
@@ -104,6 +104,11 @@ def pulse_mean(duty: ArrayLike, periods: ArrayLike, phase: ArrayLike = 0.0) -> A
 def pulse_power(voltage: ArrayLike, duty: ArrayLike, resistance: ArrayLike) -> Array:
     """Mean power of a pulsed voltage, duty V^2/R and not (duty V)^2/R, broadcast [W].
 
+    Args:
+        voltage: Voltage of the pulses [V].
+        duty: Share of the time that it is on, 0 to 1 [1].
+        resistance: Resistance, above 0 [ohm].
+
     Raises:
         ValueError: If ``duty`` is not 0 to 1, a voltage is not finite, or a resistance not above 0.
     """
@@ -118,12 +123,12 @@ def moving_average(values: ArrayLike, count: int, start: ArrayLike | None = None
     arrives after some ``count`` samples.
 
     Args:
-        values: Samples, shape (k, ...).
+        values: Samples, shape (k, ...) [any unit].
         count: Number of samples it stands for, at least 1.
-        start: Average before the first sample; None is the first sample itself.
+        start: Average before the first sample [the same unit]; None is the first sample itself.
 
     Returns:
-        Averages, same shape.
+        Averages, same shape [the same unit].
 
     Raises:
         ValueError: If ``count`` is below 1, there is no axis, or a sample is not finite.
