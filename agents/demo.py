@@ -69,6 +69,12 @@ def play(
         FileNotFoundError: If there is no such policy.
         ValueError: If it is for another task, or an argument cannot be used.
         KeyboardInterrupt: As it came, after everything was written.
+
+    Example:
+        >>> from tca_mj.agents import play
+        >>> summary = play("TCA/BendReach-v0", max_duration=0.5, progress=False)
+        >>> summary["duration"], summary["ending"]
+        (0.5, 'stopped after 0.5 s')
     """
     if max_duration is not None:
         require_positive(max_duration=max_duration)

@@ -123,6 +123,13 @@ class TetrapodGait(SimulatedTask):
     Terminates with ``info["termination_reason"]`` when the robot has fallen over or off the beam.
     Truncates after the time limit, and with ``info["truncation_reason"]`` if a TCA is too hot or
     torn, or if the simulation diverged.
+
+    Example:
+        >>> from tca_mj.envs import TetrapodGait
+        >>> env = TetrapodGait(gait="crawl")
+        >>> observation, info = env.reset(seed=0)
+        >>> observation.shape, env.action_space.shape
+        ((66,), (12,))
     """
 
     # Of each TCA of a leg [W]. Estimate: through its cold 3.7 ohm about 1 A, the most that is

@@ -157,6 +157,12 @@ def make(task: str, *, max_episode_steps: int | None = None, **arguments: Any) -
 
     Raises:
         ValueError: As ``find_task``.
+
+    Example:
+        >>> import tca_mj
+        >>> env = tca_mj.make("TCA/BendReach-v0", control_period=0.2)
+        >>> env.spec.max_episode_steps  # of 0.1 s there are 200
+        100
     """
     steps = max_episode_steps or episode_steps(task, arguments.get("control_period"))
     return gymnasium.make(task, max_episode_steps=steps, **arguments)

@@ -30,6 +30,12 @@ class Helix(Checked):
 
     Raises:
         ValueError: If a number is not finite or the radius is negative.
+
+    Example:
+        >>> from tca_mj import Helix
+        >>> Helix(4e-3, turns=0.25).offset([0.0, 1.0]).round(4)  # at both ends [m]
+        array([[0.004, 0.   ],
+               [0.   , 0.004]])
     """
 
     radius: NotNegative
@@ -113,6 +119,11 @@ def parallel(count: int, radius: float, phase: float = 0.0) -> tuple[Helix, ...]
 
     Raises:
         ValueError: If a number is out of range.
+
+    Example:
+        >>> from tca_mj import parallel
+        >>> [round(route.phase, 2) for route in parallel(3, 4e-3)]
+        [0.0, 2.09, 4.19]
     """
     require_count(count=count)
     return tuple(Helix(radius, phase=phase + 2.0 * np.pi * i / count) for i in range(count))

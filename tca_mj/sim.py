@@ -94,6 +94,13 @@ class Simulation:
         length_offset: Lengths of the TCAs over those of their curves in ``body``, shape (n,) [m].
         spines: The shape-memory spines, if there are any.
         gain: Factor of every tension over the TCAs' law, see ``tca_mj.variation``.
+
+    Example:
+        >>> from tca_mj import Simulation, bending_module
+        >>> sim = Simulation(bending_module())
+        >>> sim.step([1.0, 0.0, 0.0], 0.5)  # powers [W], for 0.5 s
+        >>> sim.temperature.round()
+        array([41., 25., 25.])
     """
 
     def __init__(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import doctest
 import inspect
 import pydoc
 import re
@@ -13,6 +14,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any, is_typeddict
 
+import pytest
 from test_architecture import FILES
 from test_names import offered
 
@@ -221,6 +223,39 @@ def test_help_fits_on_a_screen():
     """What one looks up first, on a terminal of 24 lines of 80."""
     shown = pydoc.plain(pydoc.render_doc(tca_mj.tca.hanging_length)).rstrip().splitlines()
     assert sum(max(1, -(-len(line) // 80)) for line in shown) <= 24
+
+
+# Those that documentation, examples and scripts name most, ordinary words left out.
+MOST_USED = {
+    "tca_mj": "Part Simulation Supply TcaBank TcaSpec add_chain add_tca arm finger_pair make"
+    " new_spec parallel BendingSpec bending_module TwistingSpec twisting_module Helix",
+    "tca_mj.tca": "law_at", "tca_mj.rod": "solve_static", "tca_mj.model": "settle",
+    "tca_mj.envs": "TetrapodGait", "tca_mj.agents": "play",
+    "tca_mj.agents.policies": "load_policy", "tca_mj.agents.scripts": "gait_policy",
+}  # fmt: skip
+
+
+def examples() -> dict[str, doctest.DocTest]:
+    """All examples in docstrings of what is offered, by name."""
+    read, found = doctest.DocTestParser(), {}
+    for name, value in {**FUNCTIONS, **CLASSES}.items():
+        text = inspect.cleandoc(value.__doc__ or "")
+        if ">>>" in text:
+            assert "\nExample:\n" in text, name
+            found[name] = read.get_doctest(text, {}, name, inspect.getfile(value), 0)
+    return found
+
+
+def test_what_is_used_most_has_an_example():
+    named = {f"{package}.{name}" for package, all in MOST_USED.items() for name in all.split()}
+    assert len(named) >= 20 and named <= set(examples())
+
+
+@pytest.mark.parametrize("name", examples())
+def test_examples_run(name, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    failed = doctest.DocTestRunner().run(examples()[name]).failed
+    assert not failed, capsys.readouterr().out
 
 
 def planted(length: float, shape: ArrayLike, name: str) -> Array:  # noqa: F821

@@ -254,6 +254,14 @@ def load_policy(source: str | Path, env: Any) -> Policy:
     Raises:
         FileNotFoundError: If there is no such file, nor a shipped policy of that name.
         ValueError: If the file is no policy, or one for another task.
+
+    Example:
+        >>> import tca_mj
+        >>> from tca_mj.agents.policies import load_policy
+        >>> env = tca_mj.make("TCA/BendReach-v0", action="power")
+        >>> observation, info = env.reset(seed=0)
+        >>> load_policy("bend-reach", env).act(observation).round(1)
+        array([-0.9,  1. , -0.8], dtype=float32)
     """
     saved = SavedPolicy.read(find(source))
     spec = env.spec

@@ -50,6 +50,14 @@ def gait_policy(gait: str, robot: TetrapodSpec | None = None) -> GaitPolicy:
 
     Raises:
         ValueError: If there is no such gait.
+
+    Example:
+        >>> import tca_mj
+        >>> from tca_mj.agents.scripts import gait_policy
+        >>> env = tca_mj.make("TCA/TetrapodWalk-v0", action="power")
+        >>> observation, info = env.reset(seed=0)
+        >>> gait_policy("walk").act(observation).shape
+        (12,)
     """
     if gait not in GAITS:
         raise ValueError(f"gait must be one of {list(GAITS)}, got {gait!r}")

@@ -79,6 +79,15 @@ def settle(
         ValueError: If an array has the wrong shape or is not finite, a tension is negative, or
             the chain cannot be built; or from a law.
         NotSettledError: If the chain does not come to rest.
+
+    Example:
+        >>> from tca_mj import parallel
+        >>> from tca_mj.model import settle
+        >>> from tca_mj.modules import silicone_cylinder
+        >>> beam = silicone_cylinder(45e-3, 4.5e-3, 9e-3)
+        >>> shape = settle(beam, parallel(1, 4e-3), [0.02], nodes=8)  # one TCA pulls with 0.02 N
+        >>> (1e3 * shape.position[-1]).round(1)  # of the tip [mm]
+        array([26.7,  0. , 30.8])
     """
     segment = Segment(beam, routes, tensions)
     loaded = _LoadedChain(StaticProblem([segment], tip_force, tip_moment, gravity), nodes)

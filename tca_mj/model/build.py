@@ -39,6 +39,15 @@ def add_tca(
     Raises:
         ValueError: If the kind is unknown, the route no route or out of the body, or the name
             taken.
+
+    Example:
+        >>> from tca_mj import Helix, Part, add_chain, add_tca, new_spec
+        >>> from tca_mj.modules import silicone_cylinder
+        >>> part = Part(new_spec("finger"))
+        >>> beam = silicone_cylinder(45e-3, 4.5e-3, 9e-3)
+        >>> chain = add_chain(part.spec.worldbody, beam, nodes=8, name="finger")
+        >>> add_tca(part, chain, Helix(3e-3), "free-stroke").path_length
+        0.045
     """
     if isinstance(tca, str):
         if tca not in CATALOGUE:

@@ -116,6 +116,15 @@ def add_chain(
     Raises:
         ValueError: If there are no nodes or too few for the curvature, no motions, or an unknown
             motion.
+
+    Example:
+        >>> from tca_mj import Part, add_chain, new_spec
+        >>> from tca_mj.modules import silicone_cylinder
+        >>> part = Part(new_spec("finger"))
+        >>> beam = silicone_cylinder(45e-3, 4.5e-3, 9e-3)
+        >>> chain = add_chain(part.spec.worldbody, beam, nodes=8, name="finger")
+        >>> len(chain.joints)
+        8
     """
     require_count(nodes=nodes)
     unknown = [motion for motion in motions if motion not in MOTIONS]

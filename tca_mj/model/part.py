@@ -20,6 +20,12 @@ class Part:
         tcas: The TCAs in it, in the order of a simulation's actuator axis.
         sites: Names of sites with a meaning, for example ``tip``.
         spines: The shape-memory spines in it, in the order of a simulation's heater axis.
+
+    Example:
+        >>> import tca_mj
+        >>> arm = tca_mj.arm()
+        >>> [tca.name for tca in arm.tcas][-2:], arm.sites["gripper.grasp"]
+        (['wrist.tca', 'gripper.tca'], 'gripper.grasp')
     """
 
     spec: mujoco.MjSpec
@@ -69,6 +75,12 @@ def new_spec(name: str) -> mujoco.MjSpec:
 
     Args:
         name: Name of the model.
+
+    Example:
+        >>> from tca_mj import new_spec
+        >>> spec = new_spec("robot")
+        >>> spec.modelname, spec.option.timestep
+        ('robot', 0.002)
     """
     spec = mujoco.MjSpec()
     spec.modelname = name

@@ -82,6 +82,12 @@ class BendingSpec(Checked):
 
     Raises:
         ValueError: If a dimension is not finite and positive, or a number of pieces not whole.
+
+    Example:
+        >>> from tca_mj import BendingSpec, bending_module
+        >>> spec = BendingSpec(length=60e-3, count=4)
+        >>> len(bending_module(spec).tcas)
+        4
     """
 
     length: Positive = 45e-3
@@ -117,6 +123,11 @@ def bending_module(spec: BendingSpec | None = None) -> Part:
 
     Raises:
         ValueError: If the geometry cannot be built.
+
+    Example:
+        >>> from tca_mj import BendingSpec, bending_module
+        >>> [tca.name for tca in bending_module(BendingSpec(length=60e-3)).tcas]
+        ['tca0', 'tca1', 'tca2']
     """
     spec = spec or BendingSpec()
     routes = {f"tca{i}": route for i, route in enumerate(parallel(spec.count, spec.offset))}

@@ -123,6 +123,11 @@ def finger_pair(spec: FingerPairSpec | None = None) -> Part:
 
     Raises:
         ValueError: If the geometry cannot be built.
+
+    Example:
+        >>> from tca_mj import finger_pair
+        >>> sorted(finger_pair().sites)
+        ['grasp', 'tip0', 'tip1']
     """
     spec = spec or FingerPairSpec()
     body, route = spec.body, spec.route

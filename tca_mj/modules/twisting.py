@@ -40,6 +40,12 @@ class TwistingSpec(Checked):
 
     Raises:
         ValueError: If a dimension is not finite and positive, or a number of nodes not whole.
+
+    Example:
+        >>> from tca_mj import TwistingSpec, twisting_module
+        >>> module = twisting_module(TwistingSpec(turns=4.0))
+        >>> round(1e3 * module.tcas[0].path_length)  # [mm]
+        94
     """
 
     length: Positive = 16e-3
@@ -87,6 +93,12 @@ def twisting_module(spec: TwistingSpec | None = None) -> Part:
 
     Raises:
         ValueError: If the geometry cannot be built, for example with too few nodes per turn.
+
+    Example:
+        >>> from tca_mj import Simulation, twisting_module
+        >>> sim = Simulation(twisting_module())
+        >>> sim.rest([120.0]) < 1e-4  # at 120 °C [rad/s]
+        True
     """
     spec = spec or TwistingSpec()
     routes = {"tca": spec.route}

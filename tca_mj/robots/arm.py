@@ -72,6 +72,12 @@ def arm(spec: ArmSpec | None = None) -> Part:
 
     Raises:
         ValueError: If the geometry cannot be built.
+
+    Example:
+        >>> from tca_mj import ArmSpec, BendingSpec, arm
+        >>> long = arm(ArmSpec(bending=BendingSpec(length=60e-3)))
+        >>> [round(1e3 * tca.path_length) for tca in long.tcas[:3]]  # [mm]
+        [60, 60, 60]
     """
     spec = spec or ArmSpec()
     mjspec = new_spec("arm")

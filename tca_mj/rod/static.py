@@ -39,6 +39,15 @@ def solve_static(
 
     Raises:
         ValueError, RodSolveError: As in ``solve_series``.
+
+    Example:
+        >>> from tca_mj import parallel
+        >>> from tca_mj.modules import silicone_cylinder
+        >>> from tca_mj.rod import solve_static
+        >>> beam = silicone_cylinder(45e-3, 4.5e-3, 9e-3)
+        >>> shape = solve_static(beam, parallel(1, 4e-3), [0.02])  # one TCA pulls with 0.02 N
+        >>> (1e3 * shape.position[-1]).round(1)  # of the tip [mm]
+        array([26.8,  0. , 30.8])
     """
     return solve_series([Segment(beam, routes, tensions)], **options)[0]
 

@@ -116,6 +116,13 @@ class TcaBank:
         max_temperature: Upper ends of the range of the fibre's measurements, shape (n,) [°C].
         melting_temperature: Temperatures that no TCA can have, shape (n,) [°C].
         embedded: Which TCAs lie in a body, shape (n,).
+
+    Example:
+        >>> from tca_mj import CATALOGUE, TcaBank
+        >>> bank = TcaBank([CATALOGUE["free-stroke"]] * 2)
+        >>> state, pull = bank.advance(bank.rest(), [1.0, 0.0], 1.1 * bank.rest_length, 0.5)
+        >>> state.temperature.round()
+        array([42., 25.])
     """
 
     kind = "TCA"

@@ -154,6 +154,12 @@ class TcaSpec(Checked):
         contact_ratio: Stiffness of touching coils over that of the cold coil: an estimate [1].
         contact_smoothing: Range over which the contact sets in, as a share of the minimum
             length: an estimate [1].
+
+    Example:
+        >>> from tca_mj import CATALOGUE
+        >>> tca = CATALOGUE["free-stroke"].of_length(50e-3)
+        >>> round(1e3 * tca.minimum_length, 1)  # where its coils touch [mm]
+        31.9
     """
 
     fibre: FibreSpec

@@ -76,6 +76,13 @@ class Supply(Checked):
     Raises:
         ValueError: If the quantity is unknown, a limit is not above 0, or the thermostat is
             missing.
+
+    Example:
+        >>> from tca_mj import Simulation, Supply, bending_module
+        >>> sim = Simulation(bending_module(), supply=Supply(quantity="voltage", max_voltage=12.0))
+        >>> sim.step([3.0, 0.0, 0.0], 0.5)  # [V]
+        >>> sim.power.round(2)
+        array([2.87, 0.  , 0.  ])
     """
 
     quantity: Quantity = "power"

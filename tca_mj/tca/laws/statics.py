@@ -140,6 +140,13 @@ def law_at(
     Raises:
         ValueError: As ``tension``, or if coils that are pressed to half of the minimum length
             still pull.
+
+    Example:
+        >>> from tca_mj.tca import CATALOGUE, law_at
+        >>> tca = CATALOGUE["free-stroke"]
+        >>> force, slope = law_at(tca, 100.0)(1.2 * tca.rest_length)
+        >>> print(f"{force:.3f} N, {slope:.1f} N/m")
+        0.354 N, 20.0 N/m
     """
     problem = _checked_model(tca, model, spin, scheme)
     shortest, longest = problem.domain
