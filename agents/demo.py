@@ -34,7 +34,9 @@ def play(
     Into ``out`` go ``summary.json``, ``rollout.rrd``, ``rollout.mp4`` and ``rollout.png``; files
     of these names that lay there are replaced. However the episode ends, by Ctrl-C or an error
     too, they hold all that happened until then. What this machine cannot make (a film without
-    OpenGL or imageio, a plot without Matplotlib) is left out with a line that says why.
+    OpenGL or imageio, a plot without Matplotlib) is left out with a line that says why, and so is
+    what fails meanwhile, as on a full disk: nothing of that ends the episode. What begins no file
+    is refused: a folder that cannot be written, or in which another demo writes its recording.
 
     Args:
         task: Gymnasium id, or ``module:id``.
@@ -49,7 +51,7 @@ def play(
         progress: Whether to show a progress bar, where there is a terminal.
 
     Returns:
-        The summary, with
+        The summary, None in place of numbers that a diverged end does not have, with
 
         * ``task``, ``policy``, ``seed``, ``success``, ``return``, and ``ending``: why it was over
         * ``duration`` [s]: simulated time
@@ -63,7 +65,7 @@ def play(
           ``distance`` [m], ``speed`` and ``published`` [m/s]
         * what the task says of its end (``SimulatedTask.outcome``)
         * ``versions``, ``machine``
-        * ``files`` that were written, and ``left_out``: why others were not
+        * ``files`` that were written, and ``left_out``: why others were not, or not to the end
 
     Raises:
         FileNotFoundError: If there is no such policy.

@@ -1,11 +1,16 @@
-"""An episode under way: what is seen of it, filmed, recorded and summed up, however it ends."""
+"""An episode under way: what is seen of it, filmed, recorded and summed up, however it ends.
+
+What watches never ends it: a recording, a film or a plot that fails is left out or cut off, with
+the reason, and the episode goes on.
+"""
 
 from __future__ import annotations
 
 import time
 from collections import defaultdict
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager, suppress
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from tca_mj.agents.output import write_json
+from tca_mj.agents.output import plain, write_json
 from tca_mj.agents.policies import Policy
 from tca_mj.agents.rollout import Step, rollout
 from tca_mj.envs.task import Headway
@@ -22,7 +27,6 @@ from tca_mj.envs.wrappers import RecordRerun
 from tca_mj.machine import machine, versions
 from tca_mj.record.film import Film
 from tca_mj.record.plots import rollout_plot
-from tca_mj.record.render import RenderingUnavailable
 
 SUMMARY, RECORDING, VIDEO, PLOT = "summary.json", "rollout.rrd", "rollout.mp4", "rollout.png"
 
@@ -95,7 +99,7 @@ class Episode:
             if self.out is not None:
                 for name in (VIDEO, PLOT):
                     (self.out / name).unlink(missing_ok=True)
-                self._write(self.out)
+                write_json(self.out / SUMMARY, self.summary())
                 ends.callback(self._write, self.out)
                 if PLOT in self.files:
                     ends.callback(self._plot, self.out / PLOT)
@@ -105,11 +109,8 @@ class Episode:
             ends.callback(bar.close)
             try:
                 if VIDEO in self.files and self.out is not None:
-                    path, camera = self.out / VIDEO, self.task.camera
-                    with self._attempt("video", VIDEO):
-                        film = Film(self.sim, path, fps=_FPS, speed=speed, camera=camera)
-                        film.frame()
-                        self._film = film
+                    self._attempt("video", VIDEO, partial(self._begin_film, self.out, speed))
+                    self._film_on()
                 while not self.ending:
                     self._go_on()
                     bar.set_description_str(self.policy.phase, refresh=False)
@@ -130,9 +131,7 @@ class Episode:
         self.wall["simulation"] -= self._recorded() - recorded
         self._see(self.last)
         self.ending = self.last.ending
-        if self._film is not None:
-            with self._timed("video"):
-                self._film.frame()
+        self._film_on()
 
     def _see(self, step: Step) -> None:
         sim = self.sim
@@ -158,6 +157,8 @@ class Episode:
         """What is known of the episode so far; see ``tca_mj.agents.demo.play`` for the keys."""
         names, spines, end = self.sim.tca_names, self.sim.spines, self.clock[-1]
         self.wall["recording"] = self._recorded()
+        if self.recording is not None and self.recording.failure:
+            self.left_out[RECORDING] = self.recording.failure
         found = {
             "task": self.names[0],
             "policy": self.names[1],
@@ -174,8 +175,8 @@ class Episode:
                 for name, start, until in self._spans()
             ],
             "energy": _by_name(names, self.sim.energy),
-            "peak_temperature": _by_name(names, np.max(self.samples["temperature"], axis=0)),
-            "peak_tension": _by_name(names, np.max(self.samples["tension"], axis=0)),
+            "peak_temperature": _by_name(names, np.nanmax(self.samples["temperature"], axis=0)),
+            "peak_tension": _by_name(names, np.nanmax(self.samples["tension"], axis=0)),
             **self._headway(),
             "versions": versions(),
             "machine": machine(),
@@ -184,7 +185,8 @@ class Episode:
             "heater_energy": dict(zip(spines.names, spines.energy.tolist(), strict=True)),
             **self.task.outcome(),
         }
-        return found | ({"tries": self.policy.tries} if hasattr(self.policy, "tries") else {})
+        tries = {"tries": self.policy.tries} if hasattr(self.policy, "tries") else {}
+        return plain(found | tries)
 
     def _spans(self) -> list[tuple[str, float, float]]:
         """Name, start and end of each phase."""
@@ -192,13 +194,21 @@ class Episode:
         return [(name, start, end) for (start, name), end in zip(self.phases, ends, strict=True)]
 
     def _headway(self) -> dict[str, Any]:
-        """How far a robot has got that is to get on, and how fast in each phase."""
-        way = np.array([[place.along, place.aside] for place in self.places if place is not None])
-        if not len(way):
+        """How far a robot has got that is to get on, and how fast in each phase.
+
+        What has diverged is nowhere: it got as far as it was before.
+        """
+        seen = [
+            (time, place.along, place.aside)
+            for time, place in zip(self.clock, self.places, strict=True)
+            if place is not None and np.isfinite([place.along, place.aside]).all()
+        ]
+        if not seen:
             return {}
+        clock, way = np.split(np.array(seen), [1], axis=1)
         rows = []
         for name, start, end in self._spans():
-            ends = np.interp([start, end], self.clock, way[:, 0])
+            ends = np.interp([start, end], clock[:, 0], way[:, 0])
             distance = float(ends[1] - ends[0])
             speed = round(distance / max(end - start, 1e-9), 6)
             row = {"name": name, "distance": round(distance, 6), "speed": speed}
@@ -207,39 +217,61 @@ class Episode:
         return {"distance": distance, "drift": drift, "speeds": rows}
 
     def _write(self, out: Path) -> None:
-        write_json(out / SUMMARY, self.summary())
+        try:
+            write_json(out / SUMMARY, self.summary())
+        except OSError as error:
+            self._left_out(SUMMARY, error)
+
+    def _begin_film(self, out: Path, speed: float) -> None:
+        path, camera = out / VIDEO, self.task.camera
+        self._film = Film(self.sim, path, fps=_FPS, speed=speed, camera=camera)
+
+    def _film_on(self) -> None:
+        """Films the present; if that fails there is no film from here on."""
+        film = self._film
+        if film is not None and not self._attempt("video", VIDEO, film.frame):
+            self._film = None
+            with suppress(Exception):
+                film.close()
 
     def _end_film(self) -> None:
         if self._film is not None:
-            with self._timed("video"):
-                self._film.close()
+            self._attempt("video", VIDEO, self._film.close)
 
     def _plot(self, path: Path) -> None:
+        self._attempt("plot", PLOT, partial(self._draw, path))
+
+    def _draw(self, path: Path) -> None:
         samples = {name: np.array(rows) for name, rows in self.samples.items()}
         task, policy = self.names
-        with self._attempt("plot", PLOT):
-            rollout_plot(
-                path,
-                self.clock,
-                samples["power"],
-                samples["temperature"],
-                samples["tension"],
-                samples["bend"],
-                [name.partition(".")[2] for name in self.sim.tca_names],
-                self.phases,
-                body=samples["body"] if self.sim.embedded.any() else None,
-                title=f"{policy} in {task}, seed {self.seed}: {self.ending}",
-            )
+        rollout_plot(
+            path,
+            self.clock,
+            samples["power"],
+            samples["temperature"],
+            samples["tension"],
+            samples["bend"],
+            [name.partition(".")[2] for name in self.sim.tca_names],
+            self.phases,
+            body=samples["body"] if self.sim.embedded.any() else None,
+            title=f"{policy} in {task}, seed {self.seed}: {self.ending}",
+        )
 
-    @contextmanager
-    def _attempt(self, purpose: str, name: str) -> Iterator[None]:
-        """Lets a file be left out if the machine lacks what it takes."""
+    def _attempt(self, purpose: str, name: str, do: Callable[[], object]) -> bool:
+        """Whether something went well that may fail and must not end the episode."""
         with self._timed(purpose):
             try:
-                yield
-            except (ImportError, RenderingUnavailable) as error:
-                self.left_out[name] = str(error)
-                tqdm.write(f"{name} is left out: {error}")
+                do()
+            except Exception as error:
+                self._left_out(name, error)
+                return False
+        return True
+
+    def _left_out(self, name: str, error: Exception) -> None:
+        """Notes why a file is not there, or not whole."""
+        self.left_out[name] = str(error) or type(error).__name__
+        there = self.out is not None and (self.out / name).is_file()
+        tqdm.write(f"{name} is {'cut off' if there else 'left out'}: {self.left_out[name]}")
 
     @contextmanager
     def _timed(self, purpose: str) -> Iterator[None]:

@@ -3,6 +3,7 @@
 import csv
 import io
 import json
+import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -26,3 +27,12 @@ def write_csv(path: Path, rows: Sequence[Row], columns: Sequence[str] = ()) -> P
     table.writeheader()
     table.writerows(rows)
     return write_whole(path, text.getvalue().encode())
+
+
+def plain(value: Any) -> Any:
+    """A value with None in place of the numbers that JSON does not have: infinity and NaN."""
+    if isinstance(value, Mapping):
+        return {key: plain(inner) for key, inner in value.items()}
+    if isinstance(value, list | tuple):
+        return [plain(inner) for inner in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value

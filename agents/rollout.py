@@ -58,7 +58,8 @@ def rollout(
         policy: Who acts; it is reset first.
         seed: Seed of the episode.
         options: Options of the reset.
-        decided: Called when the policy has said what it does and nothing has happened yet.
+        decided: Called when the policy has said what it does and nothing has happened yet. What
+            it raises ends the episode, as what the policy raises does.
     """
     policy.reset()
     observation, info = env.reset(seed=seed, options=dict(options) if options else None)

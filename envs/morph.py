@@ -242,16 +242,11 @@ class MorphModule(SimulatedTask):
     def observe(self) -> dict[str, ArrayLike]:
         """See ``OBSERVATION``."""
         sim = self.sim
-        length = sim.length
-        try:
-            resistance = sim.bank.resistance(sim.tca, length)
-        except ValueError:  # a diverged TCA has a length that no TCA can have
-            resistance = np.full(1, np.nan)
         return {
             "spine temperature": sim.spines.temperature,
             "TCA temperature": sim.temperature,
-            "TCA length": length,
-            "TCA resistance": resistance,
+            "TCA length": sim.length,
+            "TCA resistance": sim.resistance,
             "TCA tension": sim.tension,
             "angle": self.angle,
             "angular velocity": float(np.sum(self.data.qvel[self._bend_v])),

@@ -131,7 +131,8 @@ class Table:
         for entry, row in zip(self.entries, rows, strict=True):
             if row.size != entry.size:
                 raise ValueError(f"{entry.name} must have {entry.size} numbers, got {row.size}")
-        return np.concatenate(rows, dtype=np.float32, casting="same_kind")
+        with np.errstate(over="ignore"):  # what has diverged is found to be infinite
+            return np.concatenate(rows, dtype=np.float32, casting="same_kind")
 
     def read(self, array: NDArray[Any]) -> dict[str, NDArray[Any]]:
         """The rows of an array of shape (..., size), by name."""

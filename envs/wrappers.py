@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import atexit
 import time
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -98,9 +101,15 @@ class RecordRerun(gym.Wrapper[ObsType, ActType, ObsType, ActType], RecordConstru
     after a program that ends by Ctrl-C or an error; only a process that is killed outright leaves
     it without its table of contents (see ``tca_mj.record.Recorder``).
 
+    Recording never ends an episode. A file that cannot be begun, or that another recorder writes,
+    is refused by the first ``reset``; what fails later, as on a full disk, ends the recording
+    alone, with a ``RuntimeWarning``. A copy, also by pickle, goes on where this one is and records
+    nothing: a file is that of one environment.
+
     Attributes:
         path: The file.
-        recorder: What writes it; None before the first ``reset``.
+        recorder: What writes it; None before the first ``reset``, and if nothing is recorded.
+        failure: Why nothing is recorded any more; empty if all is well.
         seconds: Time that the recording has taken so far on the caller's thread [s].
     """
 
@@ -145,9 +154,11 @@ class RecordRerun(gym.Wrapper[ObsType, ActType, ObsType, ActType], RecordConstru
         gym.Wrapper.__init__(self, env)
         self.path = Path(path)
         self.recorder: Recorder | None = None
+        self.failure = ""
         self.seconds = 0.0
         self._options = options
         self._episode = 0
+        self._closed = False
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -156,31 +167,37 @@ class RecordRerun(gym.Wrapper[ObsType, ActType, ObsType, ActType], RecordConstru
 
         Raises:
             RuntimeError: If the wrapper was closed: a new beginning would overwrite the file.
+            ValueError, OSError: As ``Recorder``, if this is the first one.
         """
+        self._need_open()
         observation, info = self.env.reset(seed=seed, options=options)
-        start = time.perf_counter()
-        simulation: Any = self.env.unwrapped
-        if self.recorder is None:
+        if self.recorder is None and not self.failure:
+            simulation: Any = self.env.unwrapped
             self.recorder = Recorder(simulation.sim, self.path, **self._options)
             atexit.register(self.recorder.close)
         self._episode += 1
         drawn = "" if seed is None else f", seed {seed}"
-        self.recorder.event(f"episode {self._episode}{drawn}")
-        if self._episode > 1:
-            self.recorder.frame()
-        self.seconds += time.perf_counter() - start
+        with self._recording():
+            if self.recorder is not None:
+                self.recorder.event(f"episode {self._episode}{drawn}")
+                if self._episode > 1:
+                    self.recorder.frame()
         return observation, info
 
     def step(self, action: ActType) -> tuple[ObsType, Any, bool, bool, dict[str, Any]]:
-        """Steps the environment and records where that led to."""
+        """Steps the environment and records where that led to.
+
+        Raises:
+            RuntimeError: If the wrapper was closed.
+        """
+        self._need_open()
         observation, reward, terminated, truncated, info = self.env.step(action)
-        start = time.perf_counter()
-        if self.recorder is not None:
-            self.recorder.frame(info.get("reward_terms", {"reward": reward}))
-            ending = how_it_ended(terminated, truncated, info)
-            if ending is not None:
-                self.recorder.event(ending)
-        self.seconds += time.perf_counter() - start
+        with self._recording():
+            if self.recorder is not None:
+                self.recorder.frame(info.get("reward_terms", {"reward": reward}))
+                ending = how_it_ended(terminated, truncated, info)
+                if ending is not None:
+                    self.recorder.event(ending)
         return observation, reward, terminated, truncated, info
 
     def event(self, text: str) -> None:
@@ -189,19 +206,47 @@ class RecordRerun(gym.Wrapper[ObsType, ActType, ObsType, ActType], RecordConstru
         Raises:
             RuntimeError: If the environment was not reset yet, or is closed.
         """
-        if self.recorder is None:
+        self._need_open()
+        if not self._episode:
             raise RuntimeError(f"nothing is recorded to {self.path} before the first reset")
-        start = time.perf_counter()
-        self.recorder.event(text)
-        self.seconds += time.perf_counter() - start
+        with self._recording():
+            if self.recorder is not None:
+                self.recorder.event(text)
 
     def close(self) -> None:
         """Finishes the file and closes the environment; it may be called again."""
+        self._closed = True
+        try:
+            with self._recording():
+                if self.recorder is not None:
+                    self.recorder.close()
+                    atexit.unregister(self.recorder.close)
+        finally:
+            self.env.close()
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Everything but the file."""
+        return self.__dict__ | {"recorder": None, "failure": self.failure or "it is a copy"}
+
+    def _need_open(self) -> None:
+        if self._closed:
+            raise RuntimeError(f"the recording {self.path} is closed")
+
+    @contextmanager
+    def _recording(self) -> Iterator[None]:
+        """Takes the time of what is recorded, and ends the recording if that fails."""
         start = time.perf_counter()
         try:
-            if self.recorder is not None:
-                self.recorder.close()
-                atexit.unregister(self.recorder.close)
+            yield
+        except Exception as error:
+            broken, self.recorder = self.recorder, None
+            self.failure = f"{type(error).__name__}: {error}"
+            if broken is not None:
+                atexit.unregister(broken.close)
+                with suppress(Exception):
+                    broken.close()
+            warnings.warn(
+                f"the recording {self.path} has ended: {self.failure}", RuntimeWarning, stacklevel=4
+            )
         finally:
             self.seconds += time.perf_counter() - start
-            self.env.close()

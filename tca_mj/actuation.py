@@ -247,12 +247,13 @@ class MixedBank:
             ]
         )
 
-    def resistance(self, state: MixedState, length: Array) -> Array:
+    def resistance(self, state: MixedState, length: Array, *, strict: bool = True) -> Array:
         """Resistance of the TCAs, not a number for other kinds, shape (..., n) [ohm]."""
         found = [
-            bank.resistance(part, length[..., places]) if isinstance(bank, TcaBank) else None
+            bank.resistance(part, length[..., places], strict=strict)
+            if isinstance(bank, TcaBank) else None
             for (places, bank), part in zip(self.kinds, state.parts, strict=True)
-        ]
+        ]  # fmt: skip
         return self._joined(found, np.nan)
 
     def overheated(self, state: MixedState) -> NDArray[np.bool_]:

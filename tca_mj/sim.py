@@ -295,8 +295,11 @@ class Simulation:
 
     @property
     def resistance(self) -> NDArray[np.float64]:
-        """Electrical resistance of each TCA, shape (n,) [ohm]."""
-        return self.bank.resistance(self.tca, self.length)
+        """Electrical resistance of each TCA, shape (n,) [ohm].
+
+        Not a number of one that has none, as its length or temperature is beyond all bounds.
+        """
+        return self.bank.resistance(self.tca, self.length, strict=False)
 
     @property
     def energy(self) -> NDArray[np.float64]:

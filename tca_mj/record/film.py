@@ -12,13 +12,15 @@ from typing import Any
 import mujoco
 
 from tca_mj.checks import require_count, require_positive
+from tca_mj.files import Claim
 from tca_mj.record.render import Closing, Offscreen, Watched, colour_tendons
 
 
 class Film(Closing):
     """A simulation filmed at a steady rate, whatever its control period; a context manager.
 
-    The file is an mp4 (H.264, yuv420p). Frames go to the encoder one by one and are not kept.
+    The file is an mp4 (H.264, yuv420p). Frames go to the encoder one by one and are not kept. It is
+    written by one film at a time; one that has been finished is overwritten by the first frame.
     """
 
     def __init__(
@@ -37,7 +39,7 @@ class Film(Closing):
             camera: As in ``Offscreen``.
 
         Raises:
-            ImportError: If imageio or imageio-ffmpeg is not installed.
+            ImportError: If imageio, imageio-ffmpeg or its encoder is not installed.
             ValueError: If a number is out of range.
         """
         require_positive(fps=fps, speed=speed)
@@ -49,6 +51,7 @@ class Film(Closing):
             raise ValueError(f"path must end in .mp4, got {self.path}")
         self._imageio = _imageio()
         self._writer: Any = None
+        self._claim: Claim | None = None
         self._fps, self._rate = fps, fps / speed
         self._size = width, height
         self._camera = camera
@@ -64,6 +67,8 @@ class Film(Closing):
 
         Raises:
             RenderingUnavailable: If OpenGL cannot be had.
+            ValueError: If another film writes this file now.
+            OSError: If it cannot be written, or the encoder has ended.
         """
         time = self.simulation.time
         if time < self._last:
@@ -80,7 +85,7 @@ class Film(Closing):
         colour_tendons(model, self.simulation.tendon, self.simulation.temperature)
         picture = self._view.draw(self.simulation.data)
         if self._writer is None:
-            self.path.parent.mkdir(parents=True, exist_ok=True)
+            self._claim = Claim(self.path)
             self._writer = self._imageio.get_writer(
                 self.path, format="FFMPEG", mode="I", fps=self._fps, codec="libx264",
                 pixelformat="yuv420p", quality=8, macro_block_size=16, ffmpeg_log_level="error",
@@ -92,9 +97,13 @@ class Film(Closing):
     def close(self) -> None:
         """Finishes the file; it may be called again."""
         self._close_view()
-        if self._writer is not None:
-            self._writer.close()
-            self._writer = None
+        writer, self._writer = self._writer, None
+        try:
+            if writer is not None:
+                writer.close()
+        finally:
+            if self._claim is not None:
+                self._claim.close()
 
     def _close_view(self) -> None:
         if self._view is not None:
@@ -105,9 +114,9 @@ class Film(Closing):
 def _imageio() -> Any:
     """The imageio module that makes films."""
     try:
-        importlib.import_module("imageio_ffmpeg")
+        importlib.import_module("imageio_ffmpeg").get_ffmpeg_exe()
         return importlib.import_module("imageio.v2")
-    except ImportError as error:
+    except (ImportError, RuntimeError) as error:
         raise ImportError(
-            "films need imageio and imageio-ffmpeg: pip install 'tca-mj[demo]'"
+            f"films need imageio and imageio-ffmpeg: pip install 'tca-mj[demo]' ({error})"
         ) from error

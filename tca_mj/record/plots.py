@@ -6,6 +6,7 @@ thus without a display or global state.
 
 from __future__ import annotations
 
+import io
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -14,6 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from tca_mj.checks import Array, floats
+from tca_mj.files import write_whole
 
 COLDEST = 25.0  # lower end of the colour map: room temperature [°C]
 # Upper end of the colour map and limit in the plot [°C]: the lower annealing temperature [Sun,
@@ -111,7 +113,7 @@ def rollout_plot(
     """Draws power, temperature, tension and bend angle of a rollout, one above the other.
 
     Args:
-        path: Picture to write; its folder is made if it is missing.
+        path: Picture to write, in one go; its folder is made if it is missing.
         time: Time of the samples, shape (frames,) [s].
         power: Electrical power, shape (frames, n) [W].
         temperature: Temperature, shape (frames, n) [°C].
@@ -142,6 +144,10 @@ def rollout_plot(
         ("temperature", floats("temperature", temperature), temperature_limit, "°C"),
         ("tension", floats("tension", tension), tension_limit, "N"),
         ("bend angle", floats("bend", bend), None, "°"),
+    ]
+    panels = [
+        (label, np.where(np.isfinite(values), values, np.nan), limit, unit)
+        for label, values, limit, unit in panels
     ]
     for label, values, _, _ in panels:
         shape = (clock.size,) if label == "bend angle" else (clock.size, len(names))
@@ -224,6 +230,6 @@ def rollout_plot(
                       frameon=False, handlelength=1.6, borderaxespad=0.0)  # fmt: skip
     if title:
         figure.text(left, 0.967, title, fontsize=13, color="#202124", va="center")
-    target = Path(path)
-    target.parent.mkdir(parents=True, exist_ok=True)
-    figure.savefig(target)
+    drawn = io.BytesIO()
+    figure.savefig(drawn, format=Path(path).suffix[1:] or "png")
+    write_whole(Path(path), drawn.getvalue())

@@ -32,8 +32,9 @@ import rerun
 from numpy.typing import NDArray
 
 from tca_mj.checks import Array, require_count, require_positive
+from tca_mj.files import Claim
 from tca_mj.record import shapes
-from tca_mj.record.layout import QUANTITIES, blueprint, groups, line_styles
+from tca_mj.record.layout import QUANTITIES, Group, blueprint, groups, line_styles
 from tca_mj.record.plots import temperature_colour
 from tca_mj.record.render import Closing, Watched
 
@@ -85,8 +86,11 @@ class Recorder(Closing):
     contents: the viewer opens it, ``rerun rrd verify`` objects, and
     ``rerun rrd merge cut.rrd -o whole.rrd`` mends it.
 
-    The recorder reads and never changes the simulation. Poses are those of the last evaluation of
-    kinematics: after ``mj_step`` they are one physics step older than the time they stand at.
+    The recorder reads and never changes the simulation. What a state has no value of, as one that
+    has diverged, is not a number. Poses are those of the last evaluation of kinematics: after
+    ``mj_step`` they are one physics step older than the time they stand at.
+
+    A file is written by one recorder at a time. One that has been finished is overwritten.
     """
 
     def __init__(
@@ -109,7 +113,9 @@ class Recorder(Closing):
                 ``rerun rrd verify`` objects to the file.
 
         Raises:
-            ValueError: If a number is not positive, or not whole where it counts.
+            ValueError: If a number is not positive, or not whole where it counts, or another
+                recorder writes this file now, in this process or another one.
+            OSError, RuntimeError: If the file cannot be written.
         """
         require_count(every=every, chunk=chunk)
         if tca_radius is not None:
@@ -140,16 +146,20 @@ class Recorder(Closing):
         self._reward_names: list[str] = []
         self._events: list[tuple[float, int, str]] = []
 
-        self.path.parent.mkdir(parents=True, exist_ok=True)
+        self._claim = Claim(self.path)
         self._stream = rerun.RecordingStream(application_id)
-        self._stream.save(self.path, write_footer=footer)
-        centre, size = shapes.extent(model, simulation.data)
-        self._stream.send_blueprint(
-            blueprint(self._groups, centre, size, shapes.ground_height(model))
-        )
-        for entity, content in self._static(paths, moving, tca_radius, size):
-            self._stream.log(entity, content, static=True, strict=True)
-        self._stream.flush()
+        try:
+            self._stream.save(self.path, write_footer=footer)
+            centre, size = shapes.extent(model, simulation.data)
+            self._stream.send_blueprint(
+                blueprint(self._groups, centre, size, shapes.ground_height(model))
+            )
+            for entity, content in self._static(paths, moving, tca_radius, size):
+                self._stream.log(entity, content, static=True, strict=True)
+            self._stream.flush()
+        except BaseException:
+            self._end()
+            raise
 
     def frame(self, reward_terms: Mapping[str, float] | None = None) -> None:
         """Collects one sample at the simulation's present time.
@@ -169,15 +179,16 @@ class Recorder(Closing):
             return
         i, simulation, data = self._filled, self.simulation, self.simulation.data
         self._clock[i], self._steps[i] = time, step
-        self._position[:, i] = data.xpos[self._bodies]
-        self._quaternion[:, i] = data.xquat[self._bodies]
-        self._curves[:, i] = np.concatenate([group.read() for group in self._groups])
+        self._curves[:, i] = np.concatenate([_values(group) for group in self._groups])
         self._tell_beyond()
         points = data.wrap_xpos.reshape(-1, 3)
         starts = data.ten_wrapadr[simulation.tendon].tolist()
         counts = data.ten_wrapnum[simulation.tendon].tolist()
-        for strips, start, count in zip(self._strips, starts, counts, strict=True):
-            strips[i] = points[start : start + count].astype(np.float32)
+        with np.errstate(over="ignore", invalid="ignore"):  # of what has diverged
+            self._position[:, i] = data.xpos[self._bodies]
+            self._quaternion[:, i] = data.xquat[self._bodies]
+            for strips, start, count in zip(self._strips, starts, counts, strict=True):
+                strips[i] = points[start : start + count].astype(np.float32)
         for term, value in (reward_terms or {}).items():
             frames, values = self._rewards.setdefault(term, ([], []))
             frames.append(i)
@@ -216,7 +227,13 @@ class Recorder(Closing):
         try:
             self._write()
         finally:
+            self._end()
+
+    def _end(self) -> None:
+        try:
             self._stream.disconnect()
+        finally:
+            self._claim.close()
 
     def _now(self) -> float:
         """Recorded time [s]: the simulation's, but never running back."""
@@ -293,6 +310,14 @@ class Recorder(Closing):
             yield path, rerun.LineStrips3D.from_fields(radii=radius or width)
         for group in self._groups:
             yield from zip(group.paths, group.styles, strict=True)
+
+
+def _values(group: Group) -> Array:
+    """Values of a group's curves now; not numbers where the state is one that has none."""
+    try:
+        return group.read()
+    except (ArithmeticError, ValueError):
+        return np.full(len(group.paths), np.nan)
 
 
 def _packed(colour: Array) -> NDArray[np.uint32]:

@@ -46,7 +46,11 @@ class RenderingUnavailable(RuntimeError):
 
 
 class Closing:
-    """A context manager that is closed at its end."""
+    """A context manager that is closed at its end; there is one of it, no copy and no pickle."""
+
+    def __reduce_ex__(self, protocol: Any) -> Any:
+        name = type(self).__name__
+        raise TypeError(f"a {name} cannot be copied: it holds an open file or a window")
 
     def close(self) -> None:
         """Gives back what it holds; it may be called again."""

@@ -172,7 +172,7 @@ class TcaBank:
         return {
             "temperature": Signal("°C", state.temperature),
             "body temperature": Signal("°C", state.body),
-            "resistance": Signal("ohm", self.resistance(state, length)),
+            "resistance": Signal("ohm", self.resistance(state, length, strict=False)),
         }
 
     def rest(self, batch_shape: tuple[int, ...] = ()) -> TcaState:
@@ -269,9 +269,10 @@ class TcaBank:
         state = TcaState(temperature, body, state.energy_in + power * dt, state.energy_lost + lost)
         return state, self.pull(state, length)
 
-    def resistance(self, state: TcaState, length: ArrayLike) -> Array:
-        """Resistance at given lengths, shape (..., n) [ohm]; errors as ``sensing.resistance``."""
-        return resistance(self._wire, self._checked(state, "length", length), state.temperature)
+    def resistance(self, state: TcaState, length: ArrayLike, *, strict: bool = True) -> Array:
+        """Resistance at given lengths, shape (..., n) [ohm]; as ``sensing.wire.resistance``."""
+        length = self._checked(state, "length", length)
+        return resistance(self._wire, length, state.temperature, strict=strict)
 
     def power_at(self, state: TcaState, length: ArrayLike, voltage: ArrayLike) -> Array:
         """Power that a voltage drives through the present resistances, shape (..., n) [W].

@@ -29,7 +29,7 @@ import numpy as np
 from numpy.polynomial import Polynomial
 from numpy.typing import ArrayLike
 
-from tca_mj.checks import Array, Checked, Finite, NotNegative, number, within
+from tca_mj.checks import Array, Checked, Finite, NotNegative, floats, number, within
 from tca_mj.tca.arrays import column
 from tca_mj.tca.spec import TcaSpec
 
@@ -59,7 +59,9 @@ class WireTable(NamedTuple):
         )  # fmt: skip
 
 
-def resistance(wire: WireTable, length: ArrayLike, temperature: ArrayLike) -> Array:
+def resistance(
+    wire: WireTable, length: ArrayLike, temperature: ArrayLike, *, strict: bool = True
+) -> Array:
     """Resistance of n TCAs.
 
     Args:
@@ -67,18 +69,27 @@ def resistance(wire: WireTable, length: ArrayLike, temperature: ArrayLike) -> Ar
         length: Length of the TCAs, shape (..., n) [m].
         temperature: Temperature, shape (..., n) [°C]. It has no influence yet; callers give it
             so that a temperature term will not change their code.
+        strict: Whether what has no resistance is refused; otherwise its resistance is not a number.
 
     Returns:
         Resistance, shape (..., n) [ohm].
 
     Raises:
-        ValueError: If a length is not positive and finite or so long that no resistance would
-            be left, or if a temperature is not finite.
+        ValueError: If ``strict`` and a length is not positive and finite or so long that no
+            resistance would be left, or if a temperature is not finite.
     """
-    within("temperature", temperature)
-    strain = within("length", length, above=0.0, unit="m") / wire.rest_length - 1.0
-    left = 1.0 - np.where(strain > 0.0, wire.stretch, wire.contraction) * strain
-    return wire.rest_resistance * within("share of resistance left at this length", left, above=0.0)
+    if strict:
+        within("temperature", temperature)
+        within("length", length, above=0.0, unit="m")
+    length = floats("length", length)
+    with np.errstate(invalid="ignore"):
+        strain = length / wire.rest_length - 1.0
+        left = 1.0 - np.where(strain > 0.0, wire.stretch, wire.contraction) * strain
+    if strict:
+        within("share of resistance left at this length", left, above=0.0)
+    else:
+        left = np.where((length > 0.0) & (left > 0.0) & np.isfinite(temperature), left, np.nan)
+    return wire.rest_resistance * left
 
 
 def sensed_length(wire: WireTable, resistance: ArrayLike) -> Array:
