@@ -8,11 +8,11 @@ from typing import Any, ClassVar, Unpack
 
 import mujoco
 import numpy as np
-from dm_control.utils import rewards
 from numpy.typing import ArrayLike, NDArray
 
 from tca_mj.assets import mjcf
 from tca_mj.envs.options import Option, Options, Setup, Uniform, variation_options
+from tca_mj.envs.rewards import tolerance
 from tca_mj.envs.table import Entry, Table
 from tca_mj.envs.task import SimulatedTask, TaskArguments, Verdict, parts
 from tca_mj.envs.vector import TaskVector
@@ -282,8 +282,8 @@ class ArmPickPlace(SimulatedTask):
         still = inside and float(np.linalg.norm(data.qvel[dofs : dofs + 3])) < 0.02
         rests = still and self._carried and not self._touched()
         gap = math.dist(position, data.site_xpos[self._grasp])
-        near = float(rewards.tolerance(gap, bounds=(0.0, 4e-3), margin=0.05))
-        over = float(rewards.tolerance(aside, bounds=(0.0, 8e-3), margin=0.03))
+        near = float(tolerance(gap, bounds=(0.0, 4e-3), margin=0.05))
+        over = float(tolerance(aside, bounds=(0.0, 8e-3), margin=0.03))
         return {"reach": near, "carry": 4.0 * over * self._carried}, rests
 
     def _touched(self) -> bool:

@@ -8,11 +8,11 @@ from typing import Any, Unpack
 
 import mujoco
 import numpy as np
-from dm_control.utils import rewards
 from numpy.typing import ArrayLike, NDArray
 
 from tca_mj.envs.hanging import hang
 from tca_mj.envs.options import Option, Options, Setup, Uniform, variation_options
+from tca_mj.envs.rewards import tolerance
 from tca_mj.envs.table import Entry, Table
 from tca_mj.envs.task import SimulatedTask, TaskArguments, Verdict, parts
 from tca_mj.envs.vector import TaskVector
@@ -230,7 +230,7 @@ class MorphModule(SimulatedTask):
 
         def near(angle: float) -> float:
             return float(
-                rewards.tolerance(
+                tolerance(
                     abs(angle - self.target), bounds=(0.0, math.radians(1.0)), margin=math.pi,
                     sigmoid="linear", value_at_margin=0.0,
                 )

@@ -176,10 +176,14 @@ def launch(
 
     Raises:
         NoDisplay: If no window can be opened.
+        ImportError: If dm-control is not installed, see ``tca_mj.envs.rewards``.
     """
     need_display()
     os.environ["MUJOCO_GL"] = "glfw"
-    from dm_control import viewer
+    try:
+        from dm_control import viewer
+    except ModuleNotFoundError as missing:
+        raise ImportError("the window is that of dm-control, which is not installed") from missing
 
     shown = ViewerEnvironment(env, seed=seed, options=options)
     viewer.launch(shown, policy=policy, title=title, width=1280, height=960)

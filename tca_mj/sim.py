@@ -352,9 +352,15 @@ class Simulation:
         """dm_control's named view of this model and data, which it shares.
 
         For example ``physics().named.data.site_xpos["bending.tip"]``.
-        """
-        from dm_control.mujoco import Physics, wrapper  # loads OpenGL bindings: only if asked for
 
+        Raises:
+            ImportError: If dm-control is not installed, see ``tca_mj.envs.rewards``.
+        """
+        try:
+            from dm_control.mujoco import Physics, wrapper  # loads OpenGL: only if asked for
+        except ModuleNotFoundError as missing:
+            raise ImportError("the named view is that of dm-control, which is not installed; the"
+                              " places are in data.site(name), too") from missing  # fmt: skip
         return Physics(wrapper.MjData(self.data))
 
     def step(

@@ -151,6 +151,7 @@ def test_the_viewer_steps_the_task_itself(
     policy: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The adapter without a window: one state, seen by MuJoCo and through dm_control."""
+    pytest.importorskip("dm_control")
     monkeypatch.setenv("MUJOCO_GL", "disable")
     env = gym.make(TASK, **arguments_of(policy, TASK))
     shown = ViewerEnvironment(env, seed=2, options={"object": "pcb"})

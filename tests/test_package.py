@@ -146,14 +146,26 @@ def test_mjcf_finds_every_file_of_its_folder():
         assert mjcf(name).read_bytes() == path.read_bytes()
 
 
-def test_wheel_holds_the_package_and_nothing_else(tmp_path):
-    """Built from a copy, without network; files planted in assets and policies must arrive."""
-    copy = tmp_path / "copy"
+def copied(copy: Path) -> Path:
+    """A copy of what a wheel is built from."""
     copy.mkdir()
     for name in ("pyproject.toml", "README.md", "LICENSE", "MANIFEST.in"):
         shutil.copy(ROOT / name, copy)
     for name in SHIPPED:
         shutil.copytree(ROOT / name, copy / name, ignore=shutil.ignore_patterns("__pycache__"))
+    return copy
+
+
+def built(copy: Path) -> Path:
+    """The wheel of a copy, built without network."""
+    run_python("from setuptools import build_meta; build_meta.build_wheel('out')", copy)
+    (wheel,) = (copy / "out").glob("*.whl")
+    return wheel
+
+
+def test_wheel_holds_the_package_and_nothing_else(tmp_path):
+    """Files planted in assets and policies must arrive."""
+    copy = copied(tmp_path / "copy")
     planted = copy / "assets" / "mjcf" / "deep" / "planted.xml"
     planted.parent.mkdir(parents=True)
     planted.write_text("<mujoco/>", encoding="utf-8")
@@ -161,10 +173,7 @@ def test_wheel_holds_the_package_and_nothing_else(tmp_path):
     policy.parent.mkdir(exist_ok=True)
     policy.write_bytes(b"")
 
-    code = "from setuptools import build_meta; build_meta.build_wheel('out')"
-    run_python(code, copy)
-    (wheel,) = (copy / "out").glob("*.whl")
-    with zipfile.ZipFile(wheel) as archive:
+    with zipfile.ZipFile(built(copy)) as archive:
         names = set(archive.namelist())
         command = archive.read(f"tca_mj-{tca_mj.__version__}.dist-info/entry_points.txt").decode()
 

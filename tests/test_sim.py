@@ -361,6 +361,7 @@ def test_a_bad_simulation_is_refused(options, message):
 
 
 def test_dm_controls_names_see_the_same_state():
+    pytest.importorskip("dm_control")
     sim = simulation()
     physics = sim.physics()
     sim.step([1.0, 0.0, 0.0], 0.1)
