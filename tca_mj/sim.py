@@ -21,6 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 from tca_mj.actuation import Group, MixedBank, Signal, muscle_group
 from tca_mj.couple import Inputs, Writes, advance, measure, write
 from tca_mj.model.build import stage
+from tca_mj.model.complaints import listen
 from tca_mj.model.part import Part
 from tca_mj.model.smooth import SmoothBody
 from tca_mj.model.spines import Spines
@@ -138,6 +139,7 @@ class Simulation:
             raise ValueError(
                 f"tca_period must be a positive multiple of timestep {timestep} s, got {tca_period}"
             )
+        listen()
         part.spec.option.timestep = timestep
         if not part.spec.lights:  # of no influence but on pictures, which would be black
             stage(part)
@@ -172,6 +174,11 @@ class Simulation:
         self.tca: TcaState
         self.pull: Pull
         self.reset()
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """Out of a pickle, perhaps in another process."""
+        self.__dict__.update(state)
+        listen()
 
     def reset(self, place: Callable[[mujoco.MjData], None] | None = None) -> None:
         """Back to the unloaded shape at ambient temperature, whatever happened before.

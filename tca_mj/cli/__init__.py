@@ -2,7 +2,9 @@
 
 import argparse
 import sys
+from collections import Counter
 from collections.abc import Sequence
+from typing import Any
 
 import tca_mj
 from tca_mj.cli import check, learn, play
@@ -35,6 +37,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         SystemExit: With code 2 if the arguments are wrong, 0 after ``--help`` or ``--version``.
     """
     arguments = _parser().parse_args(argv)
+    before = _heard()
     try:
         return arguments.run(arguments)
     except KeyboardInterrupt:
@@ -44,6 +47,18 @@ def main(argv: Sequence[str] | None = None) -> int:
         hint = arguments.needs if isinstance(error, ImportError) else ""
         print(f"tca-mj {arguments.command}: {error}{hint}", file=sys.stderr)
         return 2
+    finally:
+        warned = _heard() - before
+        if warned:
+            from tca_mj.model.complaints import told
+
+            print(told(warned), file=sys.stderr)
+
+
+def _heard() -> Counter[str]:
+    """How often MuJoCo has warned of what; nothing if nothing has loaded it."""
+    complaints: Any = sys.modules.get("tca_mj.model.complaints")
+    return Counter() if complaints is None else complaints.heard()
 
 
 def _parser() -> argparse.ArgumentParser:

@@ -10,12 +10,14 @@ def add_commands(commands: Commands) -> None:
     """Adds bench, validate and certify."""
     bench = add_command(commands, "bench", _bench, help="measure the speed on this machine")
     add(bench, "part", "single: TCAs, one task and its recordings, a minute; vector: many tasks at"
-        " once and training, some minutes; default: both",
-        nargs="?", choices=["single", "vector"])  # fmt: skip
+        " once and training, some minutes; soak: random steps of all tasks, an hour; default: the"
+        " first two", nargs="?", choices=["single", "vector", "soak"])  # fmt: skip
     add(bench, "--task", "which, by id or module:id, several times for several; default: all, and"
         " of them the first with a demo", action="append", default=[], dest="tasks")  # fmt: skip
-    add(bench, "--out", "folder for the results, JSON and Markdown")
+    add(bench, "--out", "folder for the results, JSON and Markdown; a soak that is there goes on")
     add(bench, "--quick", "a tenth of the measurements", action="store_true")
+    add(bench, "--steps", "of a soak, in all; default 1000000", default=1_000_000)
+    add(bench, "--seed", "of a soak; default 0")
 
     validate = add_command(commands, "validate", _validate,
                            help="compare the models with what is published")  # fmt: skip
@@ -30,9 +32,24 @@ def add_commands(commands: Commands) -> None:
 
 
 def _bench(arguments: argparse.Namespace) -> int:
-    from tca_mj.bench import single, vector
+    """Measures the speed on this machine, or, with `soak`, looks for faults in very many random
+    steps: exceptions, numbers that are none, observations out of bounds, divergence, growth.
+
+    Exit code: 0, or 1 if a soak has found a fault.
+
+    examples:
+      tca-mj bench --out runs/bench
+      tca-mj bench soak --out runs/soak      goes on where it was killed
+    """
+    from tca_mj.bench import single, soak, vector
 
     scale, out, tasks = 0.1 if arguments.quick else 1.0, arguments.out, arguments.tasks
+    if arguments.part == "soak":
+        steps = max(int(scale * arguments.steps), 1)
+        arguments.kept += [f"the same command goes on in {out}"] if out else []
+        result = soak.soak(steps=steps, seed=arguments.seed, out=out, ids=tasks, say=_say)
+        _show(soak.report(result), out, "soak")
+        return 1 if soak.faults(result) else 0
     if arguments.part != "vector":
         found = single.benchmark(scale=scale, out=out, task=tasks[0] if tasks else None)
         _show(single.report(found), out, "benchmark")
@@ -80,6 +97,10 @@ def _certify(arguments: argparse.Namespace) -> int:
     result = certify(arguments.module, out=arguments.out, seed=arguments.seed)
     _show(result["text"], arguments.out, "report")
     return 0
+
+
+def _say(line: str) -> None:
+    print(line, flush=True)
 
 
 def _show(text: str, out: Path | None, name: str) -> None:

@@ -1,0 +1,18 @@
+"""What all tests share."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from tca_mj.model.complaints import listen
+
+
+@pytest.fixture(scope="session", autouse=True)
+def no_litter() -> Iterator[None]:
+    """MuJoCo writes no log where the tests run."""
+    log = Path("MUJOCO_LOG.TXT").absolute()
+    before = log.stat().st_size if log.exists() else 0
+    listen()
+    yield
+    assert (log.stat().st_size if log.exists() else 0) == before, f"{log} was written to"
