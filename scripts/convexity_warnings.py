@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tca_mj.envs.tetrapod import TetrapodGait
-from tca_mj.model.complaints import heard
+from tca_mj.model.mujoco_warnings import warning_counts
 from tca_mj.pages import table
 
 EPISODES = 150
@@ -74,10 +74,10 @@ def warned_steps(setting: Callable[[mujoco.MjModel], None]) -> tuple[list[Warned
         state = np.empty(mujoco.mj_stateSize(model, STATE))
         for _ in range(count):
             mujoco.mj_getState(model, data, state, STATE)
-            before = heard()[WARNING]
+            before = warning_counts()[WARNING]
             STEP(model, data)
             steps += 1
-            if heard()[WARNING] > before:
+            if warning_counts()[WARNING] > before:
                 found.append(Warned(copy.copy(model), state.copy()))
 
     env = TetrapodGait(gait="crawl")
@@ -94,9 +94,9 @@ def again(step: Warned, setting: Callable[[mujoco.MjModel], None]) -> tuple[Any,
     setting(model)
     data = mujoco.MjData(model)
     mujoco.mj_setState(model, data, step.state, STATE)
-    before = heard()[WARNING]
+    before = warning_counts()[WARNING]
     STEP(model, data)
-    return data.qvel.copy(), heard()[WARNING] > before
+    return data.qvel.copy(), warning_counts()[WARNING] > before
 
 
 def main() -> None:

@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 from tca_mj.actuation import Group, MixedBank, Signal, muscle_group
 from tca_mj.couple import Inputs, Writes, advance, measure, write
 from tca_mj.model.build import stage
-from tca_mj.model.complaints import listen
+from tca_mj.model.mujoco_warnings import count_warnings
 from tca_mj.model.part import Part
 from tca_mj.model.smooth import SmoothBody
 from tca_mj.model.spines import Spines
@@ -139,7 +139,7 @@ class Simulation:
             raise ValueError(
                 f"tca_period must be a positive multiple of timestep {timestep} s, got {tca_period}"
             )
-        listen()
+        count_warnings()
         part.spec.option.timestep = timestep
         if not part.spec.lights:  # of no influence but on pictures, which would be black
             stage(part)
@@ -178,7 +178,7 @@ class Simulation:
     def __setstate__(self, state: dict[str, Any]) -> None:
         """Out of a pickle, perhaps in another process."""
         self.__dict__.update(state)
-        listen()
+        count_warnings()
 
     def reset(self, place: Callable[[mujoco.MjData], None] | None = None) -> None:
         """Back to the unloaded shape at ambient temperature, whatever happened before.

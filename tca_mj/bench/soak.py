@@ -3,8 +3,9 @@
 Every task is stepped in three ways: alone, as a vector environment, and as one whose actions are
 powers. The ways take turns, the cheap ones more of them: one whose steps cost four times as much
 gets half the time, and an eighth of the steps. What a turn does is drawn from the seed, the way and
-the turn's number alone, and can thus be repeated. Half the episodes begin with options of ``reset`` that are drawn within
-their bounds; actions are drawn for every step, are at one bound or the other, or are held.
+the turn's number alone, and can thus be repeated. Half the episodes begin with options of ``reset``
+that are drawn within their bounds; actions are drawn for every step, are at one bound or the other,
+or are held.
 
 Faults, which must not be: an exception; a number in an observation, a reward or an info that is
 none; an observation outside its space; an episode that diverged; and, where actions are
@@ -31,7 +32,7 @@ from tca_mj.checks import require_count
 from tca_mj.envs.options import Options
 from tca_mj.envs.task import how_it_ended
 from tca_mj.machine import machine, versions
-from tca_mj.model.complaints import heard
+from tca_mj.model.mujoco_warnings import warning_counts
 from tca_mj.pages import made_with, page, table, write_result
 from tca_mj.registry import TASKS, find_task, make
 
@@ -94,12 +95,12 @@ def soak(
         ways = result["ways"]
         number = min(range(len(ways)), key=lambda i: _had(ways[i]))
         way = ways[number]
-        start, before = time.process_time(), heard()
+        start, before = time.process_time(), warning_counts()
         if number not in made:
             made[number] = _make(tasks[number // len(WAYS)], way["way"])
         random = np.random.default_rng([seed, number, way["turns"]])
         _take(made[number], way, random, turn, result["examples"])
-        way["warnings"] = Counter(way["warnings"]) + (heard() - before)
+        way["warnings"] = Counter(way["warnings"]) + (warning_counts() - before)
         way["turns"] += 1
         way["seconds"] += time.process_time() - start
         result["memory"].append([run, _total(result), _memory()])

@@ -10,7 +10,7 @@ from scipy.optimize import brentq
 from scipy.special import ellipk, ellipkinc
 
 from tca_mj.checks import Array
-from tca_mj.model.complaints import listen
+from tca_mj.model.mujoco_warnings import count_warnings
 from tca_mj.rod import BeamSpec
 
 # The bending module's section of Ecoflex 00-30: a cable of capsules has the same EI and GJ.
@@ -58,7 +58,7 @@ def cable(
         young=scale * YOUNG, shear=scale * YOUNG / 3.0, damping=damping,
         radius=DIAMETER / 2.0, density=DENSITY,
     )  # fmt: skip
-    listen()
+    count_warnings()
     try:
         return mujoco.MjModel.from_xml_string(text)
     except ValueError as error:

@@ -17,7 +17,7 @@ import numpy as np
 
 from tca_mj.checks import Array
 from tca_mj.model.at_rest import NotSettledError
-from tca_mj.model.complaints import listen
+from tca_mj.model.mujoco_warnings import count_warnings
 from tca_mj.model.part import Part
 from tca_mj.model.smooth import SmoothBody
 from tca_mj.rod.problem import StrandLaw
@@ -148,7 +148,7 @@ class _Body:
     ) -> None:
         _hold(part, tips, load)
         part.spec.option.timestep = _TIMESTEP
-        listen()
+        count_warnings()
         self.model: mujoco.MjModel = part.spec.compile()
         self.data = mujoco.MjData(self.model)
         self._laws = laws

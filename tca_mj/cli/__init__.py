@@ -37,7 +37,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         SystemExit: With code 2 if the arguments are wrong, 0 after ``--help`` or ``--version``.
     """
     arguments = _parser().parse_args(argv)
-    before = _heard()
+    before = _warnings()
     try:
         return arguments.run(arguments)
     except KeyboardInterrupt:
@@ -48,17 +48,17 @@ def main(argv: Sequence[str] | None = None) -> int:
         print(f"tca-mj {arguments.command}: {error}{hint}", file=sys.stderr)
         return 2
     finally:
-        warned = _heard() - before
+        warned = _warnings() - before
         if warned:
-            from tca_mj.model.complaints import told
+            from tca_mj.model.mujoco_warnings import warning_line
 
-            print(told(warned), file=sys.stderr)
+            print(warning_line(warned), file=sys.stderr)
 
 
-def _heard() -> Counter[str]:
+def _warnings() -> Counter[str]:
     """How often MuJoCo has warned of what; nothing if nothing has loaded it."""
-    complaints: Any = sys.modules.get("tca_mj.model.complaints")
-    return Counter() if complaints is None else complaints.heard()
+    counting: Any = sys.modules.get("tca_mj.model.mujoco_warnings")
+    return Counter() if counting is None else counting.warning_counts()
 
 
 def _parser() -> argparse.ArgumentParser:

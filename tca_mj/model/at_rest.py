@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from tca_mj.checks import Array
 from tca_mj.model.chain import Chain, add_chain
-from tca_mj.model.complaints import listen
+from tca_mj.model.mujoco_warnings import count_warnings
 from tca_mj.model.part import new_spec
 from tca_mj.model.smooth import SmoothBody, Strained
 from tca_mj.model.tendon import lay_tca, route_passes
@@ -120,7 +120,7 @@ class _LoadedChain:
         tip = chain.tip.add_body(name="tip", pos=[0.0, 0.0, chain.local(nodes)])
         tip.ipos = [0.0, 0.0, 0.0]
 
-        listen()
+        count_warnings()
         self._model: mujoco.MjModel = mjspec.compile()
         self._data = mujoco.MjData(self._model)
         load = [*np.asarray(problem.tip_force), *np.asarray(problem.tip_moment)]

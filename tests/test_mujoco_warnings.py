@@ -13,8 +13,8 @@ import pytest
 
 from tca_mj import cli
 from tca_mj.cli import play
-from tca_mj.model import complaints
-from tca_mj.model.complaints import heard, told
+from tca_mj.model import mujoco_warnings
+from tca_mj.model.mujoco_warnings import warning_counts, warning_line
 from tca_mj.registry import make
 
 QUICK = "TCA/BendReach-v0"
@@ -24,7 +24,7 @@ DIVERGING = """
 import multiprocessing, pickle
 import gymnasium as gym, mujoco, numpy as np
 import tca_mj
-from tca_mj.model.complaints import heard
+from tca_mj.model.mujoco_warnings import warning_counts
 
 def go(task):
     task.data.qvel[:] = np.nan
@@ -35,7 +35,7 @@ def diverges(task):
     try:
         go(task)
     except tca_mj.SimulationDiverged:
-        return heard().total()
+        return warning_counts().total()
 
 if __name__ == "__main__":
     task = gym.make("TCA/BendReach-v0").unwrapped
@@ -46,14 +46,14 @@ if __name__ == "__main__":
     try:
         go(task)
     except tca_mj.SimulationDiverged:
-        print(heard().total() > 0)
-    before = heard().total()
+        print(warning_counts().total() > 0)
+    before = warning_counts().total()
     envs = gym.make_vec("TCA/BendReach-v0", num_envs=4, num_threads=2)
     envs.reset(seed=0)
     for env in envs.envs:
         env.data.qvel[:] = np.nan
     *_, truncated, _ = envs.step(np.zeros((4, 3), dtype=np.float32))
-    print(truncated.all(), heard().total() > before)
+    print(truncated.all(), warning_counts().total() > before)
 """
 
 
@@ -73,7 +73,7 @@ def run(folder: Path, script: str) -> str:
 def counting() -> Iterator[None]:
     """Whoever else listens by now, as dm_control does once it is imported."""
     before = mujoco.get_mju_user_warning()
-    mujoco.set_mju_user_warning(complaints._count)
+    mujoco.set_mju_user_warning(mujoco_warnings._count)
     yield
     mujoco.set_mju_user_warning(before)
 
@@ -116,7 +116,7 @@ def test_a_handler_of_ones_own_stays(empty: Path, when: str) -> None:
     begin = "sim = tca_mj.Simulation(tca_mj.bending_module())"
     said = run(empty, f"""
 import mujoco, numpy as np, tca_mj
-from tca_mj.model.complaints import heard
+from tca_mj.model.mujoco_warnings import warning_counts
 mine = []
 {mine if when == "before" else begin}
 {begin if when == "before" else mine}
@@ -127,7 +127,7 @@ for each in (sim, again):
         each.step(np.zeros(3), 0.1)
     except tca_mj.SimulationDiverged:
         pass
-print(len(mine) > 0, heard().total())
+print(len(mine) > 0, warning_counts().total())
 """)  # fmt: skip
     assert said.split() == ["True", "0"]
     assert list(empty.iterdir()) == []
@@ -151,7 +151,7 @@ except tca_mj.SimulationDiverged:
 
 @pytest.mark.usefixtures("counting")
 def test_warnings_are_counted_by_kind_whatever_their_numbers() -> None:
-    before = heard()
+    before = warning_counts()
     model = mujoco.MjModel.from_xml_string(
         '<mujoco><option><flag autoreset="disable"/></option><worldbody><body><freejoint/>'
         '<geom size="1"/></body></worldbody></mujoco>'
@@ -160,16 +160,16 @@ def test_warnings_are_counted_by_kind_whatever_their_numbers() -> None:
         data = mujoco.MjData(model)
         data.time, data.qvel[dof] = 1.5 * dof, np.nan
         mujoco.mj_step(model, data)
-    kinds = [kind for kind in heard() - before if "QVEL" in kind]
+    kinds = [kind for kind in warning_counts() - before if "QVEL" in kind]
     assert len(kinds) == 1 and "at DOF #." in kinds[0] and "Time = #." in kinds[0]
-    assert (heard() - before)[kinds[0]] == 3
-    heard().clear()  # a copy
-    assert heard().total() >= 3
+    assert (warning_counts() - before)[kinds[0]] == 3
+    warning_counts().clear()  # a copy
+    assert warning_counts().total() >= 3
 
 
 def test_a_line_of_warnings() -> None:
-    assert told(Counter()) == ""
-    assert told(Counter({"a": 1, "b": 12})) == "MuJoCo warned 13 times: 12 x b, 1 x a"
+    assert warning_line(Counter()) == ""
+    assert warning_line(Counter({"a": 1, "b": 12})) == "MuJoCo warned 13 times: 12 x b, 1 x a"
 
 
 @pytest.mark.usefixtures("counting")

@@ -14,7 +14,7 @@ _heard: Counter[str] = Counter()
 _asked = False
 
 
-def listen() -> None:
+def count_warnings() -> None:
     """Counts MuJoCo's warnings from now on, unless the process has a handler of its own.
 
     Everything of this package that compiles a model calls it, and so does a simulation that comes
@@ -33,16 +33,16 @@ def _count(text: str) -> None:
     _heard[re.sub(r"\d([\d.e+-]*\d)?", "#", text)] += 1
 
 
-def heard() -> Counter[str]:
+def warning_counts() -> Counter[str]:
     """How often MuJoCo has warned of what in this process, with ``#`` for every number."""
     return Counter(_heard)
 
 
-def told(counts: Counter[str]) -> str:
+def warning_line(counts: Counter[str]) -> str:
     """Warnings in a line, the most frequent first; empty if there are none.
 
     Args:
-        counts: As ``heard`` returns them, or the difference of two of these.
+        counts: As ``warning_counts`` returns them, or the difference of two of these.
     """
     each = ", ".join(f"{count} x {text}" for text, count in counts.most_common())
     return f"MuJoCo warned {counts.total()} times: {each}" if each else ""
