@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import fields, is_dataclass, replace
 from typing import Any
 
+from tca_mj.hints import nearest
 from tca_mj.registry import task_class
 from tca_mj.tca import CATALOGUE, TcaSpec
 
@@ -45,13 +46,18 @@ def _changed(spec: Any, path: str, whole: str, value: Any) -> Any:
     name, _, rest = path.partition(".")
     known = [field.name for field in fields(spec)] if is_dataclass(spec) else []
     if name not in known:
-        raise ValueError(f"design {whole!r}: {name!r} must be one of {known}")
+        raise ValueError(
+            f"design {whole!r}: {name!r} must be one of {known}{nearest(name, known)}"
+        )
     now = getattr(spec, name)
     if rest:
         return replace(spec, **{name: _changed(now, rest, whole, value)})
     if isinstance(now, TcaSpec):
         if value not in CATALOGUE:
-            raise ValueError(f"design {whole!r} must be one of {list(CATALOGUE)}, got {value!r}")
+            raise ValueError(
+                f"design {whole!r} must be one of {list(CATALOGUE)}, got {value!r}"
+                f"{nearest(value, CATALOGUE)}"
+            )
         return replace(spec, **{name: CATALOGUE[value]})
     if isinstance(spec, TcaSpec) and name == "pitch_angle":
         return spec.of_pitch(value)

@@ -2,6 +2,8 @@
 
 from pathlib import Path
 
+from tca_mj.hints import nearest
+
 __all__ = ["mjcf"]
 
 _MJCF = Path(__file__).resolve().parent / "mjcf"
@@ -11,7 +13,7 @@ def mjcf(name: str) -> Path:
     """Finds a file of the package's MJCF folder, in an editable as in a plain install.
 
     Args:
-        name: Path below the folder, with forward slashes, such as ``"objects/pcb.xml"``.
+        name: Path below the folder, with forward slashes, such as ``"pcb.xml"``.
 
     Returns:
         The absolute path of the file.
@@ -23,5 +25,8 @@ def mjcf(name: str) -> Path:
         path.relative_to(_MJCF).as_posix(): path for path in _MJCF.rglob("*") if path.is_file()
     }
     if name not in known:
-        raise ValueError(f"no MJCF file {name!r}, known are {', '.join(sorted(known)) or 'none'}")
+        raise ValueError(
+            f"no MJCF file {name!r}, known are {', '.join(sorted(known)) or 'none'}"
+            f"{nearest(name, known)}"
+        )
     return known[name]

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from tca_mj.envs.table import numbers
+from tca_mj.hints import nearest
 from tca_mj.variation import AMBIENT, AMBIENT_SPREAD, Variation
 
 Setup = dict[str, Any]
@@ -90,7 +91,10 @@ class Options:
         """
         unknown = [key for key in given if key not in self.names]
         if unknown:
-            raise ValueError(f"options must be some of {sorted(self.names)}, got {unknown}")
+            raise ValueError(
+                f"options must be some of {sorted(self.names)}, got {unknown}"
+                f"{nearest(unknown[0], self.names)}"
+            )
         found: Setup = {}
         for row in self.rows:
             drawn = row.draw(random, found)

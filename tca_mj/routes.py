@@ -10,13 +10,19 @@ Body frame: z along the centre line from base to tip, x and y in the cross-secti
 
 from __future__ import annotations
 
+import reprlib
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from functools import partial
+from typing import Annotated, Any, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tca_mj.checks import Array, Checked, Finite, NotNegative, number, require_count
+from tca_mj.checks import Array, Checked, Finite, number, require_count
+from tca_mj.hints import size
+
+_radius = partial(size, kind="soft bodies", at_least=0.0, at_most=1.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,7 +44,7 @@ class Helix(Checked):
                [0.   , 0.004]])
     """
 
-    radius: NotNegative
+    radius: Annotated[float, _radius]
     turns: Finite = 0.0
     phase: Finite = 0.0
 
@@ -109,6 +115,26 @@ class Route(Protocol):
         """Legs in the order in which the TCA follows them, alternately up and down the body."""
 
 
+def require_route(name: str, route: Any) -> Any:
+    """A route, as it is.
+
+    Args:
+        name: What it is called, for the message.
+        route: The route.
+
+    Raises:
+        ValueError: If it has no legs; that several routes are none is said, too.
+    """
+    if tuple(getattr(route, "legs", ())):
+        return route
+    several = isinstance(route, Sequence) and any(hasattr(each, "legs") for each in route)
+    hint = "; these are several, one for each TCA, as parallel(...) gives them" if several else ""
+    raise ValueError(
+        f"{name} must be a Helix or a UTurn, or have legs of its own, got {reprlib.repr(route)}"
+        f"{hint}"
+    )
+
+
 def parallel(count: int, radius: float, phase: float = 0.0) -> tuple[Helix, ...]:
     """Routes of ``count`` straight TCAs at equal angles round the centre line.
 
@@ -145,7 +171,13 @@ def leg_length(
 
     Returns:
         Path length [m].
+
+    Raises:
+        ValueError: If ``leg`` is a whole route or several.
     """
+    if not hasattr(leg, "slope"):
+        legs = len(require_route("leg", leg).legs)
+        raise ValueError(f"leg must be one leg, got a route with {legs}: add up those of its legs")
     s = np.linspace(0.0, 1.0, points)
     r = leg.offset(s)
     slope = leg.slope(s) / body_length

@@ -31,6 +31,7 @@ LAYER_OF = {
     "machine": "door",
     "pages": "door",
     "lazy": "door",
+    "hints": "door",
     "bench": "agents",
     "validation": "agents",
     "certify": "agents",

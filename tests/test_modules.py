@@ -310,7 +310,7 @@ def test_the_arm_hangs_from_its_base_and_moves_with_it():
         (lambda: TwistingSpec(radius=0.0), r"radius must be .* above 0, got 0\.0"),
         (lambda: TwistingSpec(tube=math.inf), "tube must be finite .* got inf"),
         (lambda: TwistingSpec(tube=1.2e-3), "tube must be finite and above 0.00127304 m"),
-        (lambda: FingerPairSpec(closure=0.0), r"closure must be .* above 0, got 0\.0"),
+        (lambda: FingerPairSpec(closure=0.0), r"closure must be .* above 0 .*, got 0\.0"),
         (lambda: FingerPairSpec(layer=-1e-3), r"layer must be .* above 0, got -0\.001"),
         (lambda: FingerPairSpec(friction=-1.0), r"friction must be .* at least 0, got -1\.0"),
         (lambda: FingerPairSpec(friction=math.nan), "friction must be .* got nan"),

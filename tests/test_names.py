@@ -22,7 +22,8 @@ from test_architecture import FILES
 INTERNAL = {
     "tca_mj": {
         "actuation": "muscle_group", "bench": "*", "checks": "*", "couple": "*", "files": "*",
-        "lazy": "*", "machine": "*", "pages": "*", "quadrature": "*", "testing": "*",
+        "hints": "*", "lazy": "*", "machine": "*", "pages": "*", "quadrature": "*",
+        "routes": "require_route", "testing": "*",
     },
     "tca_mj.tca": {
         "arrays": "*", "laws.castigliano": "*", "laws.coil": "*", "laws.love": "*",

@@ -544,7 +544,7 @@ def test_a_law_that_pushes_is_refused(answer):
     [
         ({"beam": 3}, "beam must be a BeamSpec, got 3"),
         ({"routes": SPOT}, "routes must be a sequence"),
-        ({"routes": [7]}, r"routes\[0\] must have at least one leg, got 7"),
+        ({"routes": [7]}, r"routes\[0\] must be a Helix .* or have legs of its own, got 7"),
         ({"tensions": [0.1, 0.1]}, "tensions must be one per route, 1, got 2"),
         ({"tensions": 0.1}, r"tensions must be a sequence, got 0\.1"),
         ({"tensions": [-0.1]}, r"tensions\[0\] must be finite and at least 0 N, got -0\.1"),

@@ -31,6 +31,7 @@ from tca_mj.agents.policies.network import Network
 from tca_mj.control import Gait
 from tca_mj.envs.task import HEATINGS
 from tca_mj.files import write_whole
+from tca_mj.hints import nearest
 from tca_mj.registry import find_task
 
 FORMAT = 1
@@ -317,6 +318,7 @@ def find(source: str | Path) -> Path:
         return known[str(source)]
     raise FileNotFoundError(
         f"no file {path}, and no shipped policy of that name; shipped are {sorted(known)}"
+        f"{nearest(str(source), known)}"
     )
 
 

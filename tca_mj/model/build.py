@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import difflib
-
 import mujoco
 
+from tca_mj.hints import nearest
 from tca_mj.model.chain import Chain
 from tca_mj.model.part import Part
 from tca_mj.model.tendon import RoutedTca, lay_tca, route_passes
@@ -51,15 +50,11 @@ def add_tca(
     """
     if isinstance(tca, str):
         if tca not in CATALOGUE:
-            near = difflib.get_close_matches(tca, CATALOGUE, 1, 0.0)
             raise ValueError(
-                f"tca must be a TcaSpec or one of {sorted(CATALOGUE)}, got {tca!r}; did you mean"
-                f" {near[0]!r}?"
+                f"tca must be a TcaSpec or one of {sorted(CATALOGUE)}, got {tca!r}"
+                f"{nearest(tca, CATALOGUE)}"
             )
         tca = CATALOGUE[tca]
-    if not hasattr(route, "legs"):
-        hint = "; parallel(...) gives several routes, one for each TCA" if route else ""
-        raise ValueError(f"route must be a Helix or a UTurn, got {route!r}{hint}")
     name = f"tca{len(part.tcas)}" if name is None else name
     if name in [other.name for other in part.tcas]:
         raise ValueError(f"name must be new in this part, got {name!r} again")

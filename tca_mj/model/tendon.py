@@ -13,6 +13,7 @@ joints; ``tca_mj.model.smooth`` does it.
 
 from __future__ import annotations
 
+import reprlib
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -21,7 +22,7 @@ import numpy as np
 
 from tca_mj.checks import Array
 from tca_mj.model.chain import Chain, Motion
-from tca_mj.routes import Helix, Route, leg_length
+from tca_mj.routes import Helix, Route, leg_length, require_route
 from tca_mj.tca import TcaSpec
 
 
@@ -94,8 +95,12 @@ def route_passes(chain: Chain, route: Route) -> tuple[Pass, ...]:
     Args:
         chain: The chain.
         route: The route.
+
+    Raises:
+        ValueError: If it is no route.
     """
-    return tuple(Pass(chain, leg, down=bool(i % 2)) for i, leg in enumerate(route.legs))
+    legs = require_route("route", route).legs
+    return tuple(Pass(chain, leg, down=bool(i % 2)) for i, leg in enumerate(legs))
 
 
 def route_tca(
@@ -179,8 +184,12 @@ def path_length(passes: Sequence[Pass]) -> float:
         passes: Where it runs.
 
     Raises:
-        ValueError: If it has no leg.
+        ValueError: If it has no leg, or is no passes.
     """
+    if not (isinstance(passes, Sequence) and all(isinstance(each, Pass) for each in passes)):
+        raise ValueError(
+            f"passes must be those of route_passes(chain, route), got {reprlib.repr(passes)}"
+        )
     if not passes:
         raise ValueError("passes must name at least one leg, got none")
     return sum(leg_length(p.leg, p.chain.beam.length, p.chain.beam.curvature) for p in passes)

@@ -6,7 +6,8 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
-from tca_mj.checks import Checked, Count, Positive
+from tca_mj.checks import Checked, Count
+from tca_mj.hints import Length, Section
 from tca_mj.model.build import add_tca
 from tca_mj.model.chain import add_chain
 from tca_mj.model.part import Part, new_spec
@@ -49,8 +50,10 @@ def straight_module(
         A part with these TCAs and the site ``tip``.
 
     Raises:
-        ValueError: If the geometry cannot be built.
+        ValueError: If the geometry cannot be built, or the routes have no names.
     """
+    if not isinstance(routes, Mapping):
+        raise ValueError(f"routes must be routes by the names of their TCAs, got {routes!r}")
     part = Part(new_spec(name), sites={"tip": "tip"})
     chain = add_chain(part.spec.worldbody, body, nodes=nodes, name="body")
     chain.mark_tip("tip")
@@ -90,10 +93,10 @@ class BendingSpec(Checked):
         4
     """
 
-    length: Positive = 45e-3
-    diameter: Positive = 4.5e-3
-    outer_diameter: Positive = 9e-3
-    offset: Positive = 4e-3
+    length: Length = 45e-3
+    diameter: Section = 4.5e-3
+    outer_diameter: Section = 9e-3
+    offset: Section = 4e-3
     count: Count = 3
     nodes: Count = 8
     tca: TcaSpec = field(default_factory=lambda: CATALOGUE["free-stroke"])

@@ -10,6 +10,7 @@ from typing import Annotated
 import mujoco
 
 from tca_mj.checks import Checked, Count, Finite, Positive, number
+from tca_mj.hints import Length, Mass, Section
 from tca_mj.model.build import add_tca
 from tca_mj.model.chain import Chain, Motion, add_chain
 from tca_mj.model.part import Part, new_spec
@@ -60,16 +61,16 @@ class LegSpec(Checked):
             outside the plates, or one of the two bends is missing.
     """
 
-    length: Positive = 55e-3
-    rod_diameter: Positive = 0.5e-3
-    offset: Positive = 8e-3
+    length: Length = 55e-3
+    rod_diameter: Section = 0.5e-3
+    offset: Section = 8e-3
     phase: Finite = 0.0
     count: Count = 3
-    plate_radius: Positive = 9e-3
-    plate_thickness: Positive = 1e-3
+    plate_radius: Section = 9e-3
+    plate_thickness: Section = 1e-3
     plate_fill: Annotated[float, partial(number, above=0.0, at_most=1.0)] = 0.5
-    foot_radius: Positive = 5e-3
-    foot_mass: Positive = 0.56e-3
+    foot_radius: Section = 5e-3
+    foot_mass: Mass = 0.56e-3
     friction: Positive = 0.8
     plate_friction: Positive = 0.3
     damping_time: Positive = 20e-3

@@ -9,8 +9,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
+from functools import partial
+from typing import Annotated
 
-from tca_mj.checks import Checked, Count, NotNegative, Positive
+from tca_mj.checks import Checked, Count, NotNegative
+from tca_mj.hints import Length, Modulus, Section, angle, size
 from tca_mj.model.chain import add_chain
 from tca_mj.model.part import Part, new_spec
 from tca_mj.model.tendon import Pass, lay_tca
@@ -20,6 +23,7 @@ from tca_mj.routes import UTurn
 from tca_mj.tca import CATALOGUE, TcaSpec
 from tca_mj.tca.embedding import SILICONE_DENSITY, in_silicone
 
+_across = partial(size, kind="sections of soft modules", at_least=-0.1, at_most=0.1)
 _HALF = math.sqrt(0.5)
 # Rotations of the fingers' bases, wxyz: z to +x or -x of the mount, x (the outside) to its -z.
 _FRAMES = ((_HALF, 0.0, _HALF, 0.0), (0.0, -_HALF, 0.0, _HALF))
@@ -56,14 +60,14 @@ class FingerPairSpec(Checked):
             friction negative.
     """
 
-    length: Positive = 35e-3
-    width: Positive = 6e-3
-    core: Positive = 3e-3
-    layer: Positive = 1e-3
-    layer_young: Positive = 0.25e6
-    offset: float = 2.5e-3
-    half_width: float = 1.5e-3
-    closure: Positive = math.pi
+    length: Length = 35e-3
+    width: Section = 6e-3
+    core: Section = 3e-3
+    layer: Section = 1e-3
+    layer_young: Modulus = 0.25e6
+    offset: Annotated[float, _across] = 2.5e-3
+    half_width: Annotated[float, _across] = 1.5e-3
+    closure: Annotated[float, partial(angle, below=2.0 * math.pi)] = math.pi
     nodes: Count = 8
     friction: NotNegative = 1.0
     tca: TcaSpec = field(default_factory=lambda: CATALOGUE["free-stroke"])

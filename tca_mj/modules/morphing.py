@@ -9,10 +9,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from functools import partial
+from typing import Annotated
 
 import mujoco
 
-from tca_mj.checks import Checked, Count, NotNegative, Positive
+from tca_mj.checks import Checked, Count, Positive
+from tca_mj.hints import Mass, Section, size
 from tca_mj.model.chain import Chain, Motion, add_chain
 from tca_mj.model.part import Part, new_spec
 from tca_mj.model.spine import route_spine, sheath
@@ -27,6 +30,7 @@ from tca_mj.tca import CATALOGUE, TcaSpec
 # Stiffness of what is round the spine (tube, wires) over that of the soft spine. Estimate: the
 # silicone of the tube, 0.1 MPa, has 0.002 of the soft spine's bending stiffness.
 _SHEATH = 2e-3
+_weight = partial(size, kind="parts of soft robots", at_least=0.0, at_most=0.5, unit="kg")
 _PROTRUSIONS = 6  # pairs that hold the tube; Sun, Fig. 6.1, shows them, the number is an estimate
 
 
@@ -55,9 +59,9 @@ class MorphingSpec(Checked):
     spine: SpineSpec = field(default_factory=SpineSpec)
     heater: HeaterSpec = field(default_factory=lambda: HeaterSpec.fitted(SpineSpec()))
     tca: TcaSpec = field(default_factory=lambda: CATALOGUE["free-stroke"])
-    mass: Positive = 3.5e-3
-    half_width: Positive = 1.6e-3
-    tip_mass: NotNegative = 0.0
+    mass: Mass = 3.5e-3
+    half_width: Section = 1.6e-3
+    tip_mass: Annotated[float, _weight] = 0.0
     damping_time: Positive = 20e-3
     motions: tuple[Motion, ...] = ("bend_x", "bend_y", "twist")
     nodes: Count = 10

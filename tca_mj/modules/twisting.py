@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 
-from tca_mj.checks import Checked, Count, Positive, number
+from tca_mj.checks import Checked, Count, number
+from tca_mj.hints import Length, Section
 from tca_mj.model.part import Part
 from tca_mj.modules.bending import silicone_cylinder, straight_module
 from tca_mj.rod.beam import BeamSpec
@@ -48,15 +49,15 @@ class TwistingSpec(Checked):
         94
     """
 
-    length: Positive = 16e-3
-    diameter: Positive = 7e-3
-    outer_diameter: Positive = 10e-3
-    radius: Positive = 3.5e-3
+    length: Length = 16e-3
+    diameter: Section = 7e-3
+    outer_diameter: Section = 10e-3
+    radius: Section = 3.5e-3
     turns: float = 5.0
     double: bool = True
     nodes: Count = 8
     tca: TcaSpec = field(default_factory=lambda: CATALOGUE["free-stroke"])
-    tube: float = 3.2e-3
+    tube: Section = 3.2e-3
 
     def __post_init__(self) -> None:
         Checked.__post_init__(self)

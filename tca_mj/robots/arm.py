@@ -6,10 +6,13 @@ The arm hangs from a base that moves only up and down.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import partial
+from typing import Annotated
 
 import mujoco
 
-from tca_mj.checks import Checked, Positive, number, within
+from tca_mj.checks import Checked, number, within
+from tca_mj.hints import Mass, Section, size
 from tca_mj.model.part import Part, new_spec
 from tca_mj.model.surface import TOUCHES_NOTHING
 from tca_mj.modules.bending import BendingSpec, bending_module
@@ -39,17 +42,19 @@ class ArmSpec(Checked):
     bending: BendingSpec = field(default_factory=BendingSpec)
     twisting: TwistingSpec = field(default_factory=TwistingSpec)
     gripper: FingerPairSpec = field(default_factory=FingerPairSpec)
-    connector: Positive = 1.5e-3
-    connector_mass: Positive = 0.1e-3
+    connector: Section = 1.5e-3
+    connector_mass: Mass = 0.1e-3
     height: float = 0.14
     travel: tuple[float, float] = (0.07, 0.18)
-    speed: Positive = 0.04
+    speed: Annotated[float, partial(size, kind="slides", at_most=10.0, unit="m/s")] = 0.04
 
     def __post_init__(self) -> None:
         Checked.__post_init__(self)
         low, high = within("travel", self.travel, shape=(2,), above=0.0, unit="m")
+        size("travel", float(high), kind="slides", at_most=10.0)
         if not low < high:
             raise ValueError(f"travel must be a low and a higher height, got {self.travel}")
+        size("height", self.height, kind="slides", at_most=10.0)
         number("height", self.height, at_least=low, at_most=high, unit="m, of travel")
 
 

@@ -19,7 +19,8 @@ from typing import Annotated, Any
 
 import mujoco
 
-from tca_mj.checks import Checked, Count, Positive, number
+from tca_mj.checks import Checked, Count, Positive
+from tca_mj.hints import Length, Mass, Section, angle
 from tca_mj.model.chain import Chain, Motion, add_chain
 from tca_mj.model.part import Part, new_spec
 from tca_mj.model.spine import lumped_torsion, route_spine, sheath
@@ -36,7 +37,7 @@ LEGS = ("front_left", "front_right", "rear_left", "rear_right")  # names, in ord
 SIDES = {"left": 1.0, "right": -1.0}  # the sign of y
 SPINES = 3  # how many
 
-_Bend = Annotated[float, partial(number, above=-math.pi, below=math.pi, unit="rad")]
+_Bend = Annotated[float, partial(angle, above=-math.pi, below=math.pi)]
 # Stiffness of what is round a spine (tube, wires) over that of the soft spine. Estimate.
 _SHEATH = 0.01
 
@@ -73,14 +74,14 @@ class TetrapodSpec(Checked):
     spine: SpineSpec = field(default_factory=SpineSpec)
     heater: HeaterSpec = field(default_factory=lambda: HeaterSpec.fitted(SpineSpec()))
     tca: TcaSpec = field(default_factory=lambda: CATALOGUE["free-stroke"])
-    module_mass: Positive = 3.5e-3
-    spacing: Positive = 40e-3
+    module_mass: Mass = 3.5e-3
+    spacing: Length = 40e-3
     memory_angle: _Bend = math.radians(20.0)
-    rail_length: Positive = 150e-3
-    rail_width: Positive = 6e-3
-    rail_mass: Positive = 3e-3
-    leg_station: Positive = 62e-3
-    leg_height: Positive = 6e-3
+    rail_length: Length = 150e-3
+    rail_width: Section = 6e-3
+    rail_mass: Mass = 3e-3
+    leg_station: Length = 62e-3
+    leg_height: Section = 6e-3
     belly_friction: Positive = 0.3
     nodes: Count = 4
 

@@ -9,6 +9,7 @@ from typing import Annotated, Any
 import numpy as np
 
 from tca_mj.checks import Checked, NotNegative, Positive, Triple, require_positive, within
+from tca_mj.hints import size
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,8 +25,8 @@ class Outline(Checked):
         ValueError: If a half is not finite and positive, or those of a disc differ.
     """
 
-    half_width: Positive
-    half_height: Positive
+    half_width: Annotated[float, partial(size, kind="soft bodies", at_most=1.0)]
+    half_height: Annotated[float, partial(size, kind="soft bodies", at_most=1.0)]
     round: bool = True
 
     def __post_init__(self) -> None:
@@ -74,7 +75,7 @@ class BeamSpec(Checked):
         ValueError: If a number is not finite or not positive where it must be.
     """
 
-    length: Positive
+    length: Annotated[float, partial(size, kind="soft bodies", at_most=10.0)]
     bending: Annotated[tuple[float, float], partial(within, shape=(2,), above=0.0)]
     torsion: Positive
     stretching: Positive

@@ -14,7 +14,7 @@ from tca_mj.checks import Checked, NotNegative, number, within
 from tca_mj.rod.beam import BeamSpec
 from tca_mj.rod.errors import RodSolveError
 from tca_mj.rod.lie import matrix_quaternion
-from tca_mj.routes import Route
+from tca_mj.routes import Route, require_route
 
 _PROBES = (np.arange(512) + 0.5) / 512  # where a leg of a route is tried
 _OFF = 0.1  # part of a leg's way in the section by which its slope may miss it at the probes
@@ -147,10 +147,7 @@ def _keep(spec: Segment | StaticProblem, shape: tuple[int, ...], *fields: str) -
 
 
 def _require_legs(field: str, route: Any) -> None:
-    legs = tuple(getattr(route, "legs", ()))
-    if not legs:
-        raise ValueError(f"{field} must have at least one leg, got {route!r}")
-    for leg in legs:
+    for leg in require_route(field, route).legs:
         for name in ("offset", "slope"):
             if not callable(getattr(leg, name, None)):
                 raise ValueError(f"legs of {field} must have the method {name}(s), got {leg!r}")

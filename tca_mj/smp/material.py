@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from functools import partial
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.special import expit
 
 from tca_mj.checks import Array, Checked, Finite, Positive, number, require_positive, within
+from tca_mj.hints import Length, Modulus, Section, modulus
 
 # Above 110 °C the modulus is below this, Sun, dissertation, Colorado State University, 6.1.3 [Pa].
 SOFT_MODULUS = 50e6
@@ -39,8 +42,8 @@ class SmpSpec(Checked):
         ValueError: If a number is out of range.
     """
 
-    glassy: Positive = 2.5e9
-    rubbery: Positive = 6e6
+    glassy: Annotated[float, partial(modulus, kind="glasses", least=1e7)] = 2.5e9
+    rubbery: Modulus = 6e6
     rigid_below: float = 80.0
     soft_above: Finite = 110.0
     rigid_share: float = 0.9
@@ -121,11 +124,11 @@ class SpineSpec(Checked):
     """
 
     smp: SmpSpec = field(default_factory=SmpSpec)
-    length: Positive = 115e-3
-    width: Positive = 6.5e-3
-    thickness: Positive = 2.5e-3
-    module_height: Positive = 5e-3
-    tca_offset: Positive = 2.5e-3
+    length: Length = 115e-3
+    width: Section = 6.5e-3
+    thickness: Section = 2.5e-3
+    module_height: Section = 5e-3
+    tca_offset: Section = 2.5e-3
 
     def __post_init__(self) -> None:
         Checked.__post_init__(self)

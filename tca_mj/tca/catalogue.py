@@ -20,7 +20,16 @@ from collections.abc import Mapping
 from dataclasses import replace
 from types import MappingProxyType
 
+from tca_mj.hints import nearest
 from tca_mj.tca.spec import FibreSpec, TcaSpec
+
+
+class _Named(dict[str, TcaSpec]):
+    """TCAs by name; who asks for another one is told which there are."""
+
+    def __missing__(self, name: object) -> TcaSpec:
+        raise KeyError(f"name must be one of {sorted(self)}, got {name!r}{nearest(name, self)}")
+
 
 # Sun, Table 3.1 (radius 0.21 mm, 4.71 rad/mm).
 _THREAD_3 = FibreSpec(load_softening=(3.24e-4, -0.027, 1.0))
@@ -92,15 +101,15 @@ _SELF_COILED = TcaSpec(
 # weight: pitch angles in the code published with Sun et al., github.com/jiefengsun/TCA-TRO. 15°
 # at 0 g is the natural length.
 FREE_STROKE_CREPT: Mapping[str, TcaSpec] = MappingProxyType(
-    {
+    _Named({
         f"{weight} g": _FREE_STROKE_MADE.of_pitch(math.radians(pitch))
         for weight, pitch in ((0, 15.0), (2, 16.0), (30, 20.0), (60, 22.0))
-    }
-)
+    })
+)  # fmt: skip
 
 # Published TCAs by name, as long as they were made.
 CATALOGUE: Mapping[str, TcaSpec] = MappingProxyType(
-    {
+    _Named({
         # The contact length of type 0 follows from its free stroke of 5.7 %: the coils must touch
         # below its natural length, which is shorter than its made length.
         "type-0-180": _type(0.061, contact=0.061 * (1.0 - 0.057)),
@@ -111,8 +120,8 @@ CATALOGUE: Mapping[str, TcaSpec] = MappingProxyType(
         "free-stroke": _FREE_STROKE,
         "free-stroke-made": _FREE_STROKE_MADE,
         "self-coiled": _SELF_COILED,
-    }
-)
+    })
+)  # fmt: skip
 
 # The modules of Chapters 4 and 5 use the free-stroke TCA, type 2-180 on the thread of Chapter 3
 # (Section 3.4.1). Its length in a module is the natural one, without prestretch: assumed, as
@@ -122,7 +131,7 @@ _THREAD = CATALOGUE["free-stroke"]
 
 # TCAs of the modules and experiments, cut to length, by where they are found.
 MODULE_TCAS: Mapping[str, TcaSpec] = MappingProxyType(
-    {
+    _Named({
         # Table 2.3, self-sensing and control: 350 mm of thread, 110 mm natural, 133.5 mm made,
         # 6.7 ohm/dm. Called type 1-180 there; the lengths are those of type 2-180.
         "sensing": CATALOGUE["type-2-180"].of_pitch(math.asin(0.110 / 0.350)),
@@ -136,5 +145,5 @@ MODULE_TCAS: Mapping[str, TcaSpec] = MappingProxyType(
         # Section 4.2.1: three of them, cut to 45 mm, in a finger of 40 mm. Two in series have
         # 6.0 ohm by the 6.7 ohm/dm of Table 2.3; 6.6 ohm are reported with their leads.
         "finger": _THREAD.of_length(0.045),
-    }
-)
+    })
+)  # fmt: skip

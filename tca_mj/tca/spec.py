@@ -15,12 +15,19 @@ from functools import partial
 from typing import Annotated, Literal
 
 from tca_mj.checks import Checked, NotNegative, Positive, Temperature, Triple, number, within
+from tca_mj.hints import angle, modulus, size
 from tca_mj.tca.arrays import column
 from tca_mj.tca.mandrel import BRILL_TRANSITION, kept_share
 from tca_mj.tca.thermal import BodyHeat, HeatSpec
 
 _ABSOLUTE_ZERO = -273.15  # [°C]
 _UPRIGHT = math.pi / 2.0  # pitch of a straight fibre [rad]
+
+_Modulus = Annotated[float, partial(modulus, kind="fibres", least=1e7)]
+_LineDensity = Annotated[float, partial(size, kind="fibres", at_most=0.1, unit="kg/m")]
+_length = partial(size, kind="threads", at_most=10.0)
+_coil = partial(size, kind="coils", at_most=0.05)
+_pitch = partial(angle, below=_UPRIGHT)
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -59,16 +66,16 @@ class FibreSpec(Checked):
             choice, not settled by the source: "cold" is an assumption.
     """
 
-    radius: Positive = 0.21e-3
-    young: Positive = 1.2e9
-    shear: Positive = 0.22e9
-    filament_young: Positive = 3.9e9
+    radius: Annotated[float, partial(size, kind="fibres", at_most=5e-3)] = 0.21e-3
+    young: _Modulus = 1.2e9
+    shear: _Modulus = 0.22e9
+    filament_young: _Modulus = 3.9e9
     softening: float = 0.0011e9
     load_softening: Triple = (0.0, 0.0, 1.0)
     inserted_twist: NotNegative = 4710.0
     untwist_scale: NotNegative = 1.0
     expansion: Triple = (3.5e-6, -6.7e-5, 1.0)
-    line_density: Positive = 4 * 23.5e-6 * 218.0 / 175.0
+    line_density: _LineDensity = 4 * 23.5e-6 * 218.0 / 175.0
     specific_heat: Positive = 1267.0
     reference_temperature: float = 25.0
     temperature_range: tuple[float, float] = (25.0, 160.0)
@@ -163,9 +170,9 @@ class TcaSpec(Checked):
     """
 
     fibre: FibreSpec
-    fibre_length: Positive
-    coil_radius: float
-    pitch_angle: Annotated[float, partial(number, above=0.0, below=_UPRIGHT)]
+    fibre_length: Annotated[float, _length]
+    coil_radius: Annotated[float, _coil]
+    pitch_angle: Annotated[float, _pitch]
     minimum_pitch_angle: float
     breaking_force: Positive = 0.78
     resistance_per_length: Positive = 67.0
@@ -180,7 +187,7 @@ class TcaSpec(Checked):
     def __post_init__(self) -> None:
         Checked.__post_init__(self)
         number("coil_radius (spring index above 1)", self.coil_radius, above=self.fibre.radius)
-        number("minimum_pitch_angle", self.minimum_pitch_angle, above=0.0, below=self.pitch_angle)
+        angle("minimum_pitch_angle", self.minimum_pitch_angle, below=self.pitch_angle)
         if not isinstance(self.body, BodyHeat | None):
             raise ValueError(f"body must be a BodyHeat or None, got {self.body!r}")
         stretch = max(1.0 / math.sin(self.pitch_angle) - 1.0, 1e-300)  # there no resistance is left
@@ -216,15 +223,16 @@ class TcaSpec(Checked):
             The TCA at its natural length, other numbers at their defaults.
 
         Raises:
-            ValueError: If a number is out of range or the coils touch (annealed too cold).
+            ValueError: If a number is out of range, as in millimetres or degrees, or the coils
+                touch (annealed too cold).
         """
-        number("fibre_length", fibre_length, above=0.0)
-        number("core_diameter", core_diameter, above=0.0)
-        number("groove_pitch_angle", groove_pitch_angle, above=0.0, below=_UPRIGHT)
+        _length("fibre_length", fibre_length)
+        _coil("core_diameter", core_diameter)
+        _pitch("groove_pitch_angle", groove_pitch_angle)
         radius = 0.5 * core_diameter + fibre.radius
         if minimum_pitch_angle is None:
             minimum_pitch_angle = math.asin(fibre.radius / (math.pi * radius))
-        number("minimum_pitch_angle", minimum_pitch_angle, above=0.0, below=groove_pitch_angle)
+        angle("minimum_pitch_angle", minimum_pitch_angle, below=groove_pitch_angle)
         kept = 1.0
         if annealing_temperature is not None:
             number("annealing_temperature", annealing_temperature, above=BRILL_TRANSITION,
@@ -287,7 +295,7 @@ class TcaSpec(Checked):
 
     def of_length(self, rest_length: float) -> TcaSpec:
         """A piece of the same coil (in the same body) with another natural length [m]."""
-        number("rest_length", rest_length, above=0.0)
+        _length("rest_length", rest_length)
         return replace(self, fibre_length=rest_length / self.rest_length * self.fibre_length)
 
     def of_pitch(self, pitch_angle: float) -> TcaSpec:
@@ -295,7 +303,7 @@ class TcaSpec(Checked):
 
         The coil's radius follows, cos(pitch)/winding; the contact length stays.
         """
-        number("pitch_angle", pitch_angle, above=0.0, below=_UPRIGHT)
+        _pitch("pitch_angle", pitch_angle)
         radius = math.cos(pitch_angle) / self.winding
         return replace(self, pitch_angle=pitch_angle, coil_radius=radius)
 

@@ -179,7 +179,7 @@ def coil_alone(tca: TcaSpec) -> TcaSpec:
     """The TCA with all that does not matter made the same for all; what is not named matters."""
     return replace(
         tca,
-        fibre=replace(tca.fibre, line_density=1.0, specific_heat=1.0),
+        fibre=replace(tca.fibre, line_density=1e-4, specific_heat=1.0),
         fibre_length=1.0, breaking_force=1.0, resistance_per_length=1.0, stretch_resistance=0.0,
         contraction_resistance=0.0, heat_loss=1.0, ambient=25.0, body=None,
         contact_ratio=1.0, contact_smoothing=0.5,
