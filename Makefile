@@ -1,4 +1,4 @@
-# Needs python3 (3.11 or 3.12) with venv, and make; everything else goes into .venv.
+# Needs python3 (3.11 to 3.13) with venv, and make; everything else goes into .venv.
 #   make PYTHON=python3.12 ...    uses another Python
 
 PYTHON ?= python3

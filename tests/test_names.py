@@ -15,6 +15,8 @@ from typing import Any
 import pytest
 from test_architecture import FILES
 
+import tca_mj
+
 # What other files of the package use of its modules ("" for all of them), "*" for all that is not
 # offered.
 # By their own names users import ``tca_mj.checks`` (specifications of one's own) and
@@ -156,8 +158,21 @@ def test_a_package_that_offers_nothing_says_so():
         assert not hasattr(import_module(f"tca_mj.{name}"), "__all__"), name
 
 
-def test_modules_are_found_through_their_packages():
-    import tca_mj
+def test_what_pages_have_told_to_import_is_found_there():
+    lines = (Path(__file__).parent / "documented_imports.txt").read_text(encoding="utf-8")
+    paths = [line for line in lines.splitlines() if not line.startswith("#")]
+    assert len(paths) > 100
+    missing = []
+    for path in paths:
+        module, _, name = path.partition(":")
+        try:
+            found = pkgutil.resolve_name(module)
+            getattr(found, name) if name else None
+        except (AttributeError, ImportError) as error:
+            missing.append(f"{path}: {error}")
+    assert missing == []
 
+
+def test_modules_are_found_through_their_packages():
     assert tca_mj.robots.arm.arm is tca_mj.arm  # the module, whatever was imported before
     assert tca_mj.rod.beam.BeamSpec is tca_mj.BeamSpec
