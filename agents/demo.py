@@ -10,7 +10,7 @@ import gymnasium as gym
 import numpy as np
 
 from tca_mj.agents.episode import PLOT, RECORDING, VIDEO, Episode
-from tca_mj.agents.policies import Policy
+from tca_mj.agents.policies import Policy, Preprocessing
 from tca_mj.agents.policies.actors import actor, arguments_of
 from tca_mj.checks import require_positive
 from tca_mj.registry import make
@@ -23,6 +23,7 @@ def play(
     seed: int = 0,
     options: Mapping[str, Any] | None = None,
     arguments: Mapping[str, Any] | None = None,
+    preprocessing: Preprocessing | None = None,
     out: Path | None = None,
     video: bool = True,
     speed: float | None = None,
@@ -43,7 +44,8 @@ def play(
         policy: Who acts: a policy, or what ``tca_mj.agents.policies.actors.actor`` knows by name.
         seed: Seed of the episode.
         options: Options of the reset.
-        arguments: Of the task; None for what a policy with a name needs, else the task's own.
+        arguments: Of the task, on top of what a policy with a name needs.
+        preprocessing: What became of the observations of a model of Stable-Baselines3.
         out: Folder for the files, made if it is missing; None to write nothing.
         video: Whether to make the film, which takes longer than the simulation.
         speed: Simulated seconds per second of film [1]; None for what suits the task.
@@ -83,10 +85,13 @@ def play(
     if speed is not None:
         require_positive(speed=speed)
     named = isinstance(policy, str | Path)
-    needed = arguments_of(str(policy), task) if named and arguments is None else arguments or {}
-    env: gym.Env[Any, Any] = make(task, **needed)
+    needed = arguments_of(str(policy), task) if named else {}
+    env: gym.Env[Any, Any] = make(task, **needed | dict(arguments or {}))
     # Before a file is touched.
-    acting = actor(policy, env, seed=seed) if isinstance(policy, str | Path) else policy
+    acting = (
+        actor(policy, env, seed=seed, preprocessing=preprocessing)
+        if isinstance(policy, str | Path) else policy
+    )  # fmt: skip
     name = str(policy) if named else type(policy).__name__
     files = (RECORDING, VIDEO, PLOT) if video else (RECORDING, PLOT)
     episode = Episode(

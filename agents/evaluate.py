@@ -24,8 +24,9 @@ from tqdm import tqdm
 
 import tca_mj  # noqa: F401  (registers the tasks in a new process)
 from tca_mj.agents.design import robot_of
-from tca_mj.agents.policies.actors import NAMES, actor, arguments_of, best_of
-from tca_mj.agents.policies.files import find
+from tca_mj.agents.policies import Policy, Preprocessing
+from tca_mj.agents.policies.actors import NAMES, actor, arguments_of
+from tca_mj.agents.policies.load import find
 from tca_mj.agents.rollout import rollout
 from tca_mj.agents.workers import Workers
 from tca_mj.checks import Checked, Count, number, require_count
@@ -69,6 +70,9 @@ class Evaluation(Checked):
         timestep: Physics time step [s]; None for the task's own.
         design: Figures of the robot that differ from the default, see
             ``tca_mj.agents.design.robot_of``.
+        arguments: What the task is made with, on top of what the policy's file says: ``action``,
+            ``control_period``.
+        preprocessing: What became of the observations of a model of Stable-Baselines3.
 
     Raises:
         ValueError: If something is unknown or out of range.
@@ -83,6 +87,8 @@ class Evaluation(Checked):
     model: str = "used"
     timestep: float | None = None
     design: Mapping[str, Any] = field(default_factory=dict)
+    arguments: Mapping[str, Any] = field(default_factory=dict)
+    preprocessing: Preprocessing = Preprocessing()
 
     def __post_init__(self) -> None:
         models = ("used", *task_class(self.task).finer)
@@ -104,10 +110,13 @@ class Evaluation(Checked):
         """Tells apart what must not be mixed: settings, the policy's contents, versions."""
         settings = asdict(self)
         del settings["episodes"], settings["seed"]
-        if not self.design:
-            del settings["design"]
+        for name, usual in (
+            ("design", {}), ("arguments", {}), ("preprocessing", Preprocessing()),
+        ):  # fmt: skip
+            if getattr(self, name) == usual:
+                del settings[name]
         if self.policy not in NAMES:
-            settings["policy"] = hashlib.sha256(find(best_of(self.policy)).read_bytes()).hexdigest()
+            settings["policy"] = hashlib.sha256(find(self.policy).read_bytes()).hexdigest()
         text = json.dumps([settings, versions()], sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()[:16]
 
@@ -117,7 +126,7 @@ class Evaluation(Checked):
         Raises:
             ValueError: If the time step does not fit.
         """
-        more = arguments_of(self.policy, self.task)
+        more = arguments_of(self.policy, self.task) | dict(self.arguments)
         more |= {} if self.timestep is None else {"timestep": self.timestep}
         task = task_class(self.task)
         if self.design:
@@ -126,6 +135,10 @@ class Evaluation(Checked):
             argument, default = task.robot_argument
             more |= task.finer[self.model](more.get(argument) or default())
         return make(self.task, max_episode_steps=self.steps, **more)
+
+    def actor(self, env: gym.Env[Any, Any], seed: int) -> Policy:
+        """Who acts in an environment; errors as ``tca_mj.agents.policies.actors.actor``."""
+        return actor(self.policy, env, seed=seed, preprocessing=self.preprocessing)
 
 
 def run_episode(evaluation: Evaluation, seed: int) -> dict[str, Any]:
@@ -144,7 +157,7 @@ def run_episode(evaluation: Evaluation, seed: int) -> dict[str, Any]:
     """
     env = evaluation.make()
     try:
-        policy = actor(evaluation.policy, env, seed=seed)
+        policy = evaluation.actor(env, seed)
         task: Any = env.unwrapped
         episode = rollout(env, policy, seed=seed, options=evaluation.options)
         step, start = next(episode), task.headway()
@@ -209,7 +222,7 @@ def evaluate(
     require_count(workers=workers)
     key = evaluation.key()
     env = evaluation.make()
-    actor(evaluation.policy, env)  # before any process starts: a wrong name is said at once
+    evaluation.actor(env, evaluation.seed)  # before any process starts: who is wrong is told now
     env.close()
     seeds = range(evaluation.seed, evaluation.seed + evaluation.episodes)
     path = None if out is None else out / EPISODES

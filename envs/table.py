@@ -93,6 +93,11 @@ class Table:
         """Every number by its row's centre and scale, shape (..., size), of the order of 1."""
         return ((array - self._centre) / self._scale).astype(np.float32)
 
+    @property
+    def units(self) -> NDArray[np.float32]:
+        """Centre and scale of every number, shape (2, size)."""
+        return np.array([self._centre, self._scale])
+
     def mirrored(self, array: NDArray[Any]) -> NDArray[Any]:
         """What a mirror that swaps left and right makes of an array, shape (..., size).
 

@@ -57,6 +57,7 @@ LOWEST = {
     "stable_baselines3": "agents",
     "torch": "agents",
     "cmaes": "agents",
+    "onnx": "agents",
     "ray": "agents",
     "tqdm": "agents",
 }

@@ -13,6 +13,7 @@ import pytest
 
 from tca_mj import cli, registry
 from tca_mj.agents import demo
+from tca_mj.agents.policies import Preprocessing
 from tca_mj.agents.policies.actors import actor, arguments_of
 from tca_mj.bench import single, vector
 from tca_mj.envs.arm import ArmPickPlace
@@ -55,6 +56,7 @@ def test_the_demo_says_how_it_ended(
     assert answer["asked"] == {
         "task": TASK, "policy": "scripted", "seed": 4, "out": out, "video": False,
         "options": {"object": "pcb", "object_position": [0.001, -0.002]},
+        "arguments": {}, "preprocessing": Preprocessing(),
     }  # fmt: skip
     said = capsys.readouterr().out
     assert f"scripted in {TASK}: success after 31.5 s, 42 J, at most 140 °C" in said

@@ -207,7 +207,7 @@ def test_bad_settings_are_refused(wrong, message):
 def test_an_unknown_policy_is_said_before_anything_runs(tmp_path):
     with pytest.raises(FileNotFoundError, match="no shipped policy"):
         evaluate(replace(SHORT, policy="nobody"), out=tmp_path / "new", progress=False)
-    with pytest.raises(FileNotFoundError, match=r"no best\.json and no best\.npz"):
+    with pytest.raises(FileNotFoundError, match=r"none of best\.json, best\.npz"):
         evaluate(replace(SHORT, policy=str(tmp_path)), out=tmp_path / "new", progress=False)
     saved(tmp_path)
     with pytest.raises(ValueError, match="is a policy for TCA/TetrapodWalk-v0"):

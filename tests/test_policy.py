@@ -9,7 +9,7 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
-from tca_mj.agents.policies import Origin, SavedPolicy, files, load_policy
+from tca_mj.agents.policies import Origin, SavedPolicy, files, load_policy, shipped
 from tca_mj.agents.policies.actors import arguments_of
 from tca_mj.agents.policies.network import Network
 from tca_mj.agents.scripts.tetrapod import WALK, gait_policy
@@ -261,7 +261,7 @@ def test_a_file_from_before_there_were_arguments_is_one_of_power(tmp_path):
 
 
 def test_every_shipped_policy_can_be_loaded():
-    for name, path in files.shipped().items():
+    for name, path in shipped().items():
         saved = SavedPolicy.read(path)
         policy = load_policy(name, make(saved.task, **saved.arguments))
         policy.reset()

@@ -1,6 +1,8 @@
 """Policies: who acts, what it is made of, and its file; beside them those that come with tca_mj.
 
-``gait`` and ``network`` act, ``files`` keeps them, ``actors`` finds them by name.
+``gait`` and ``network`` act, ``files`` keeps them, ``load`` makes what is in a file ready for a
+task, ``actors`` finds who acts by name. ``sb3_zip`` reads models of Stable-Baselines3, ``onnx``
+writes for other runtimes.
 """
 
 from tca_mj.lazy import offer

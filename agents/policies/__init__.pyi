@@ -1,21 +1,28 @@
-from tca_mj.agents.policies.actors import Blind, actor, arguments_of, best_of, first_gait, scripted
+from tca_mj.agents.policies.actors import Blind, actor, arguments_of, first_gait, scripted
 from tca_mj.agents.policies.files import (
     NetworkPolicy,
     Origin,
     Policy,
     ResidualPolicy,
     SavedPolicy,
-    find,
-    load_policy,
-    require_arguments,
-    shipped,
     with_clock,
 )
 from tca_mj.agents.policies.gait import GaitPolicy
+from tca_mj.agents.policies.load import (
+    find,
+    load_policy,
+    read_zip,
+    require_arguments,
+    saved_policy,
+    shipped,
+)
 from tca_mj.agents.policies.network import Network
+from tca_mj.agents.policies.preprocessing import Preprocessing, Statistics
+from tca_mj.agents.policies.sb3_zip import Model
 
 __all__ = [
-    "Blind", "GaitPolicy", "Network", "NetworkPolicy", "Origin", "Policy", "ResidualPolicy",
-    "SavedPolicy", "actor", "arguments_of", "best_of", "find", "first_gait", "load_policy",
-    "require_arguments", "scripted", "shipped", "with_clock",
+    "Blind", "GaitPolicy", "Model", "Network", "NetworkPolicy", "Origin", "Policy", "Preprocessing",
+    "ResidualPolicy", "SavedPolicy", "Statistics", "actor", "arguments_of", "find", "first_gait",
+    "load_policy", "read_zip", "require_arguments", "saved_policy", "scripted", "shipped",
+    "with_clock",
 ]  # fmt: skip

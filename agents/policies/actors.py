@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tca_mj.agents.policies import Policy, SavedPolicy, load_policy
-from tca_mj.agents.policies.files import find, require_arguments
+from tca_mj.agents.policies import Policy, Preprocessing, SavedPolicy, load_policy
 from tca_mj.agents.policies.gait import GaitPolicy
+from tca_mj.agents.policies.load import ZIP, find, require_arguments
 from tca_mj.control import Gait
 from tca_mj.registry import make, task_class
 
@@ -41,21 +41,26 @@ class Blind:
         return self.draw()
 
 
-def actor(name: str | Path, env: Any, *, seed: int = 0) -> Policy:
+def actor(
+    name: str | Path, env: Any, *, seed: int = 0, preprocessing: Preprocessing | None = None
+) -> Policy:
     """Who acts in an environment.
 
     Args:
-        name: One of ``NAMES``, the name of a shipped policy, a policy's file, or the folder of a
-            training run, whose best policy is taken.
+        name: One of ``NAMES``, the name of a shipped policy, a policy's file, a model of
+            Stable-Baselines3 (``.zip``), or the folder of a training run, whose best policy is
+            taken.
         env: The Gymnasium environment.
         seed: Seed of what is random.
+        preprocessing: What became of the observations of a model of Stable-Baselines3, see
+            ``tca_mj.agents.policies.load.read_zip``.
 
     Raises:
         FileNotFoundError: If there is no such policy.
         ValueError: If it is one for another task, or the task has no script.
     """
     if str(name) not in NAMES:
-        return load_policy(best_of(name), env)
+        return load_policy(name, env, preprocessing)
     if name == "scripted":
         return scripted(env)
     if name == "random":
@@ -68,12 +73,13 @@ def arguments_of(name: str | Path, task: str) -> dict[str, Any]:
     """Arguments of a task that a policy needs it to be made with; errors as ``actor``.
 
     Args:
-        name: As for ``actor``.
+        name: As for ``actor``; a model of Stable-Baselines3 does not say.
         task: Gymnasium id, or ``module:id``.
     """
     if name == "scripted":
         return dict(task_class(task).scripted_arguments)
-    return {} if str(name) in NAMES else dict(SavedPolicy.read(find(best_of(name))).arguments)
+    path = None if str(name) in NAMES else find(name)
+    return {} if path is None or path.suffix == ZIP else dict(SavedPolicy.read(path).arguments)
 
 
 def scripted(env: Any) -> Policy:
@@ -122,19 +128,3 @@ def first_gait(task: str, start: str) -> tuple[Gait, tuple[float, ...]]:
     gait = replace(script.gait, offset=TROT) if start == "trot" else script.gait
     return gait, tuple(np.broadcast_to(script.steering, gait.legs).tolist())
 
-
-def best_of(name: str | Path) -> str | Path:
-    """The file of the best policy, if ``name`` is the folder of a training run; else ``name``.
-
-    Args:
-        name: Folder of a run, or whatever else a policy is called by.
-
-    Raises:
-        FileNotFoundError: If the folder has no policy yet.
-    """
-    if not Path(name).is_dir():
-        return name
-    found = [path for path in map(Path(name).joinpath, ("best.json", "best.npz")) if path.is_file()]
-    if not found:
-        raise FileNotFoundError(f"no best.json and no best.npz in {name}")
-    return found[0]

@@ -5,7 +5,8 @@ is a network, its arrays. Kinds:
 
 * ``gait``: a ``.json`` file that is the header; a gait and its steering.
 * ``network``: a ``.npz`` file; ``header`` is the JSON text, ``mean`` and ``var`` normalise the
-  observation, ``weight0``, ``bias0``, ``weight1``, ... are the layers (see ``Network``).
+  observation, ``weight0``, ``bias0``, ``weight1``, ... are the layers; ``units`` and ``bounds``
+  are there if the network has them (see ``Network``).
 * ``residual``: a ``.npz`` file with both; the network sees the observation and the gait's phase,
   and corrects the temperatures of the gait within a bound.
 
@@ -18,7 +19,6 @@ import io
 import json
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
-from importlib.resources import files
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -26,13 +26,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tca_mj.agents.output import write_json
+from tca_mj.agents.policies.archives import LONGEST, arrays, content_of, why
 from tca_mj.agents.policies.gait import GaitPolicy
 from tca_mj.agents.policies.network import Network
+from tca_mj.agents.policies.onnx import onnx_model
 from tca_mj.control import Gait
-from tca_mj.envs.task import HEATINGS
 from tca_mj.files import write_whole
-from tca_mj.hints import nearest
-from tca_mj.registry import find_task
 
 FORMAT = 1
 KINDS = {"gait": ".json", "network": ".npz", "residual": ".npz"}
@@ -58,7 +57,7 @@ class Origin:
 
     Attributes:
         algorithm: What made it, as ``cma`` or ``ppo``.
-        seed: Seed of the run.
+        seed: Seed of the run; None if it had none.
         steps: Steps of the environment that the run had made by then.
         command: The command that made it.
         source: What it started from, or what else is to be known.
@@ -66,7 +65,7 @@ class Origin:
     """
 
     algorithm: str
-    seed: int
+    seed: int | None
     steps: int
     command: str = ""
     source: str = ""
@@ -137,15 +136,39 @@ class SavedPolicy:
         if self.network is None:
             return write_json(path, header)
         network = self.network
-        names = ("clip", "epsilon", "activation", "squash")
+        names = ["clip", "epsilon", "activation", "squash"]
+        names += ["limit"] * (network.limit is not None)
         header |= {"network": {name: getattr(network, name) for name in names}}
         header |= {"bound": self.bound} if self.kind == "residual" else {}
-        arrays: dict[str, Any] = {"mean": network.mean, "var": network.var}
+        rows: dict[str, Any] = {"mean": network.mean, "var": network.var}
         for i, (weight, bias) in enumerate(zip(network.weights, network.biases, strict=True)):
-            arrays |= {f"weight{i}": weight, f"bias{i}": bias}
+            rows |= {f"weight{i}": weight, f"bias{i}": bias}
+        more = {"units": network.units, "bounds": network.bounds}
+        rows |= {name: array for name, array in more.items() if array is not None}
         memory = io.BytesIO()
-        np.savez(memory, allow_pickle=False, header=np.array(json.dumps(header)), **arrays)
+        np.savez(memory, allow_pickle=False, header=np.array(json.dumps(header)), **rows)
         return write_whole(path, memory.getvalue())
+
+    def to_onnx(self, path: str | Path) -> Path:
+        """Writes the network as an ONNX file, see ``onnx.onnx_model``, in one go.
+
+        Task, arguments and origin are in the model's metadata.
+
+        Raises:
+            ImportError: If ``onnx`` is not installed (the extra ``onnx``).
+            ValueError: If the policy is or has a gait, which is no network, or the ending is not
+                ``.onnx``.
+        """
+        if self.network is None or self.kind == "residual":
+            raise ValueError(
+                f"policy must be a network to become ONNX, got a {self.kind}: what its gait does"
+                " depends on time and on the TCAs' heat"
+            )
+        if Path(path).suffix != ".onnx":
+            raise ValueError(f"path must end in .onnx, got {path}")
+        about = {"arguments": dict(self.arguments), "origin": asdict(self.origin)}
+        noted = {"task": self.task} | {name: json.dumps(value) for name, value in about.items()}
+        return write_whole(Path(path), onnx_model(self.network, noted))
 
     @classmethod
     def read(cls, path: str | Path) -> SavedPolicy:
@@ -155,12 +178,15 @@ class SavedPolicy:
             FileNotFoundError: If there is none.
             ValueError: If it is not a policy's, or of a newer format.
         """
-        content = Path(path).read_bytes()
         try:
-            arrays: dict[str, NDArray[Any]] = {}
+            content, found = content_of(path), {}
+            if Path(path).suffix == ".zip":
+                raise ValueError("a model is read together with its task, by read_zip")
             if Path(path).suffix == ".npz":
-                arrays = dict(np.load(io.BytesIO(content), allow_pickle=False))
-                content = str(arrays.pop("header")).encode()
+                found = arrays(content)
+                content = str(found.pop("header")).encode()
+            if len(content) > LONGEST:
+                raise ValueError(f"header must have at most {LONGEST} bytes, got {len(content)}")
             header = json.loads(content)
             if header["format"] != FORMAT:
                 raise ValueError(f"format must be {FORMAT}, got {header['format']}")
@@ -171,12 +197,14 @@ class SavedPolicy:
                 origin=Origin(**header["origin"]),
                 gait=_gait(header["gait"]) if header["kind"] != "network" else None,
                 steering=tuple(header.get("steering", ())),
-                network=_network(header, arrays) if header["kind"] != "gait" else None,
+                network=_network(header, found) if header["kind"] != "gait" else None,
                 bound=header.get("bound", 0.0),
                 arguments=header.get("arguments", {"action": "power"}),
             )
+        except FileNotFoundError:
+            raise
         except Exception as error:
-            raise ValueError(f"{path} is no policy: {type(error).__name__}: {error}") from error
+            raise ValueError(f"{path} is no policy: {why(error)}") from error
 
     def make(self, env: Any) -> Policy:
         """The policy, ready for an episode in an environment; errors as ``GaitPolicy.in_task``."""
@@ -245,90 +273,6 @@ def with_clock(observation: NDArray[np.float32], walker: GaitPolicy) -> NDArray[
     return np.append(observation, np.array([np.sin(angle), np.cos(angle)], dtype=np.float32))
 
 
-def load_policy(source: str | Path, env: Any) -> Policy:
-    """A saved policy, ready to act in an environment.
-
-    Args:
-        source: Path of a file, or the name of a shipped policy (see ``shipped``).
-        env: The Gymnasium environment; its task has to be the policy's.
-
-    Raises:
-        FileNotFoundError: If there is no such file, nor a shipped policy of that name.
-        ValueError: If the file is no policy, or one for another task.
-
-    Example:
-        >>> import tca_mj
-        >>> from tca_mj.agents.policies import load_policy
-        >>> env = tca_mj.make("TCA/BendReach-v0", action="power")
-        >>> observation, info = env.reset(seed=0)
-        >>> load_policy("bend-reach", env).act(observation).round(1)
-        array([-0.9,  1. , -0.8], dtype=float32)
-    """
-    saved = SavedPolicy.read(find(source))
-    spec = env.spec
-    if spec is not None and spec.id != saved.task.rpartition(":")[2]:
-        raise ValueError(f"{source} is a policy for {saved.task}, not for {spec.id}")
-    require_arguments(saved.arguments, env)
-    network = saved.network
-    if network is not None:
-        given = (env.observation_space.shape[0], env.action_space.shape[0])
-        needed = (network.inputs - (2 if saved.kind == "residual" else 0), network.outputs)
-        if needed != given:
-            raise ValueError(
-                f"{source} turns {needed[0]} numbers into {needed[1]}, the task has"
-                f" {given[0]} and {given[1]}"
-            )
-    return saved.make(env)
-
-
-def require_arguments(arguments: Mapping[str, Any], env: Any) -> None:
-    """Refuses an environment that was made with other arguments than a policy needs.
-
-    Args:
-        arguments: What the policy needs.
-        env: The environment.
-
-    Raises:
-        ValueError: If one of ``action`` and ``control_period`` differs.
-    """
-    task: Any = env.unwrapped
-    given = {"action": task.heating, "control_period": task.control_period}
-    usual = {"action": HEATINGS[0], "control_period": type(task).control_period}
-    usual |= {} if env.spec is None else dict(find_task(env.spec.id).kwargs)
-    for name, value in given.items():
-        needed = arguments.get(name) or usual[name]
-        if needed != value:
-            raise ValueError(f"{name} must be {needed!r} for this policy, got {value!r}")
-
-
-def find(source: str | Path) -> Path:
-    """The file of a policy.
-
-    Args:
-        source: A file, or the name of one of ``shipped``.
-
-    Raises:
-        FileNotFoundError: If there is none.
-    """
-    path = Path(source)
-    if path.is_file():
-        return path
-    known = shipped()
-    if str(source) in known:
-        return known[str(source)]
-    raise FileNotFoundError(
-        f"no file {path}, and no shipped policy of that name; shipped are {sorted(known)}"
-        f"{nearest(str(source), known)}"
-    )
-
-
-def shipped() -> dict[str, Path]:
-    """The files of the policies that come with the package, by name."""
-    folder = Path(str(files("tca_mj.agents.policies")))
-    found = sorted(folder.glob("*")) if folder.is_dir() else []
-    return {path.stem: path for path in found if path.suffix in KINDS.values()}
-
-
 def _gait(row: Mapping[str, Any]) -> Gait:
     def rows(value: Any) -> Any:
         return tuple(rows(x) for x in value) if isinstance(value, list) else value
@@ -336,12 +280,12 @@ def _gait(row: Mapping[str, Any]) -> Gait:
     return Gait(**{name: rows(value) for name, value in row.items()})
 
 
-def _network(header: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]]) -> Network:
-    layers = range((len(arrays) - 2) // 2)
+def _network(header: Mapping[str, Any], found: Mapping[str, NDArray[Any]]) -> Network:
+    rest: dict[str, Any] = dict(found)
+    layers = range(sum(name.startswith("weight") for name in found))
     return Network(
-        weights=tuple(arrays[f"weight{i}"].astype(np.float32) for i in layers),
-        biases=tuple(arrays[f"bias{i}"].astype(np.float32) for i in layers),
-        mean=arrays["mean"],
-        var=arrays["var"],
+        weights=tuple(rest.pop(f"weight{i}").astype(np.float32) for i in layers),
+        biases=tuple(rest.pop(f"bias{i}").astype(np.float32) for i in layers),
+        **rest,
         **header["network"],
     )

@@ -2,14 +2,33 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
+from typing import Annotated, Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tca_mj.checks import Checked, Positive, within
+from tca_mj.checks import Checked, NotNegative, number, require_one_of, within
 
-ACTIVATIONS = ("tanh", "relu")
+Floats: TypeAlias = NDArray[np.float32]
+
+
+def _positive_or_none(name: str, value: Any) -> None:
+    if value is not None:
+        number(name, value, above=0.0)
+
+
+MaybePositive = Annotated[float | None, _positive_or_none]
+
+ACTIVATIONS: dict[str, Callable[[Floats], Floats]] = {
+    "tanh": np.tanh,
+    "relu": lambda h: np.maximum(h, 0.0),
+    "elu": lambda h: np.where(h > 0.0, h, np.expm1(np.minimum(h, 0.0))),
+    "leaky_relu": lambda h: np.where(h > 0.0, h, 0.01 * h),
+    "silu": lambda h: 0.5 * h * (1.0 + np.tanh(0.5 * h)),  # h/(1 + exp(-h)) without overflow
+}
 SQUASHES = ("clip", "tanh")
 
 
@@ -17,37 +36,44 @@ SQUASHES = ("clip", "tanh")
 class Network(Checked):
     """A multi-layer perceptron behind a normalisation, without noise.
 
-    The observation x becomes clip((x - mean)/sqrt(var + epsilon), ±clip), passes through the
-    layers W h + b with the activation between them, and is squashed into -1 to 1.
+    The observation x, in ``units`` where there are any, becomes
+    clip((x - mean)/sqrt(var + epsilon), ±clip), passes through the layers W h + b with the
+    activation between them, is kept within ±limit, and is squashed to what lies within ``bounds``.
 
     Attributes:
         weights: One matrix per layer, shape (out, in), float32.
         biases: One row per layer, shape (out,), float32.
         mean: Of each number of the observation, shape (in,), float64 [their units].
         var: Variance of each, shape (in,), float64 [their units squared].
-        clip: Largest size of a normalised number [1].
+        clip: Largest size of a normalised number [1]; None for no limit.
         epsilon: Added to the variance [as ``var``].
-        activation: ``tanh`` or ``relu``.
-        squash: ``clip`` (what is beyond ±1 is cut off) or ``tanh``.
+        activation: One of ``ACTIVATIONS``.
+        squash: ``clip`` (what is out of bounds is cut off) or ``tanh`` (its -1 and 1 are the
+            bounds).
+        limit: Largest size of what is squashed [1]; None for no limit.
+        units: Centre and scale by which each number of the observation is taken first, in float32,
+            shape (2, in) [their units]; None for the observation as it is.
+        bounds: Least and most of each number of an action, shape (2, out), float32 [1]; None for
+            -1 and 1.
 
     Raises:
         ValueError: If shapes do not fit, numbers are not finite or a name is unknown.
     """
 
-    weights: tuple[NDArray[np.float32], ...]
-    biases: tuple[NDArray[np.float32], ...]
+    weights: tuple[Floats, ...]
+    biases: tuple[Floats, ...]
     mean: NDArray[np.float64]
     var: NDArray[np.float64]
-    clip: Positive = 10.0
-    epsilon: Positive = 1e-8
-    activation: str = "tanh"
-    squash: str = "clip"
+    clip: MaybePositive = 10.0
+    epsilon: NotNegative = 1e-8
+    activation: Annotated[str, partial(require_one_of, choices=tuple(ACTIVATIONS))] = "tanh"
+    squash: Annotated[str, partial(require_one_of, choices=SQUASHES)] = "clip"
+    limit: MaybePositive = None
+    units: Floats | None = None
+    bounds: Floats | None = None
 
     def __post_init__(self) -> None:
         Checked.__post_init__(self)
-        for name, known in (("activation", ACTIVATIONS), ("squash", SQUASHES)):
-            if getattr(self, name) not in known:
-                raise ValueError(f"{name} must be one of {known}, got {getattr(self, name)!r}")
         if not self.weights or len(self.weights) != len(self.biases):
             raise ValueError(
                 f"biases must be as many as weights and at least 1, got {len(self.biases)}"
@@ -63,9 +89,17 @@ class Network(Checked):
                 )
             width = bias.shape
         for array in (*self.weights, *self.biases):
-            within("weights and biases", array)
+            wrong = array.size - int(np.isfinite(array).sum())
+            if wrong:
+                raise ValueError(f"weights and biases must be finite, got {wrong} that are not")
         within("mean", self.mean)
-        within("var", self.var, at_least=0.0)
+        within("var + epsilon", within("var", self.var, at_least=0.0) + self.epsilon, above=0.0)
+        if self.units is not None:
+            within("units", self.units, shape=(2, self.inputs))
+            within("units[1]", self.units[1], above=0.0)
+        if self.bounds is not None:
+            low, high = within("bounds", self.bounds, shape=(2, self.outputs))
+            within("bounds[1] - bounds[0]", high - low, above=0.0)
 
     @property
     def inputs(self) -> int:
@@ -77,12 +111,25 @@ class Network(Checked):
         """Length of an action."""
         return len(self.biases[-1])
 
-    def __call__(self, observation: NDArray[np.floating]) -> NDArray[np.float32]:
-        """Action between -1 and 1, shape (outputs,), to an observation of shape (inputs,)."""
-        scaled = (observation - self.mean) / np.sqrt(self.var + self.epsilon)
-        hidden: NDArray[np.float32] = np.clip(scaled, -self.clip, self.clip).astype(np.float32)
+    def __call__(self, observation: NDArray[np.floating]) -> Floats:
+        """Action within the bounds, shape (outputs,), to an observation of shape (inputs,)."""
+        seen: NDArray[Any] = observation
+        if self.units is not None:
+            seen = ((observation - self.units[0]) / self.units[1]).astype(np.float32)
+        seen = (seen - self.mean) / np.sqrt(self.var + self.epsilon)
+        if self.clip is not None:
+            seen = np.clip(seen, -self.clip, self.clip)
+        hidden: Floats = seen.astype(np.float32)
         for i, (weight, bias) in enumerate(zip(self.weights, self.biases, strict=True)):
             hidden = weight @ hidden + bias
             if i + 1 < len(self.weights):
-                hidden = np.tanh(hidden) if self.activation == "tanh" else np.maximum(hidden, 0.0)
-        return np.tanh(hidden) if self.squash == "tanh" else np.clip(hidden, -1.0, 1.0)
+                hidden = ACTIVATIONS[self.activation](hidden)
+        if self.limit is not None:
+            hidden = np.clip(hidden, -self.limit, self.limit)
+        if self.squash == "clip":
+            return np.clip(hidden, *((-1.0, 1.0) if self.bounds is None else self.bounds))
+        hidden = np.tanh(hidden)
+        if self.bounds is None:
+            return hidden
+        low, high = self.bounds
+        return low + 0.5 * (hidden + 1.0) * (high - low)

@@ -4,6 +4,7 @@ An argument that its type refuses ends the program with code 2 and the reason.
 """
 
 import argparse
+import math
 import os
 from collections.abc import Callable
 from functools import partial
@@ -51,6 +52,44 @@ def add(parser: argparse._ActionsContainer, name: str, help: str, **more: Any) -
     parser.add_argument(name, help=help, **{**_KINDS.get(name, {}), **more})
 
 
+def add_how_trained(parser: argparse.ArgumentParser) -> None:
+    """Adds what a policy's file says and a model of Stable-Baselines3 (.zip) does not."""
+    group = parser.add_argument_group(
+        "how a model of Stable-Baselines3 (.zip) was trained",
+        "Its file says neither what the task was made with nor how it saw it: say what differs from"
+        "\nthe defaults. Other policies say it themselves.",
+    )
+    add(group, "--action", "what the TCAs are told; default: the policy's, else the task's",
+        choices=("temperature", "power"))  # fmt: skip
+    add(group, "--control-period", "time of a step [s]; default: the policy's, else the task's",
+        type=parse_seconds, metavar="SECONDS")  # fmt: skip
+    add(group, "--scaled", "whether it saw scaled observations, as TaskVecEnv(scaled=True) and"
+        " ScaledObservation give them; default: told from the bounds of what it saw",
+        action=argparse.BooleanOptionalAction, default=None)  # fmt: skip
+    add(group, "--normalize", "statistics of the VecNormalize that it was trained in: an .npz of"
+        " mean, var, clip and epsilon, or its pickle", type=Path, metavar="FILE")  # fmt: skip
+    add(group, "--trust", "read that pickle, which runs whatever is in it; a .zip needs no trust",
+        action="store_true")  # fmt: skip
+
+
+def how_trained(arguments: argparse.Namespace) -> dict[str, Any]:
+    """What ``add_how_trained`` has read: ``arguments`` of the task, and ``preprocessing``.
+
+    Raises:
+        FileNotFoundError: If there are no such statistics.
+        ValueError: If they cannot be read, or not without trust.
+    """
+    from tca_mj.agents.policies import Preprocessing, Statistics
+
+    given = {"action": arguments.action, "control_period": arguments.control_period}
+    path = arguments.normalize
+    statistics = None if path is None else Statistics.read(path, trust=arguments.trust)
+    return {
+        "arguments": {name: value for name, value in given.items() if value is not None},
+        "preprocessing": Preprocessing(scaled=arguments.scaled, statistics=statistics),
+    }
+
+
 def filled(text: str) -> str:
     """A help's text with the first task for ``{task}`` and the first demo for ``{demo}``."""
     return text.format(task=TASKS[0].id, demo=next(iter(DEMOS)))
@@ -66,6 +105,17 @@ def parse_seed(text: str, *, least: int = 0) -> int:
 
 
 parse_count = partial(parse_seed, least=1)
+
+
+def parse_seconds(text: str) -> float:
+    """A time above 0 [s]."""
+    try:
+        seconds = float(text)
+    except ValueError:
+        seconds = math.nan
+    if not 0.0 < seconds < math.inf:
+        raise argparse.ArgumentTypeError(f"must be a number above 0 s, got {text!r}")
+    return seconds
 
 
 def parse_task(text: str) -> str:

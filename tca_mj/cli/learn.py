@@ -5,7 +5,16 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from tca_mj.cli.arguments import ALGORITHMS, Commands, add, add_command, parse_axis, task_name
+from tca_mj.cli.arguments import (
+    ALGORITHMS,
+    Commands,
+    add,
+    add_command,
+    add_how_trained,
+    how_trained,
+    parse_axis,
+    task_name,
+)
 
 
 def add_commands(commands: Commands) -> None:
@@ -24,6 +33,7 @@ def add_commands(commands: Commands) -> None:
     add(evaluation, "--out", "folder; default runs/eval/TASK-POLICY")
     add(evaluation, "--workers", "processes; default 1", default=1)
     add(evaluation, "--fresh", "forget what the folder holds", action="store_true")
+    add_how_trained(evaluation)
 
     train = add_command(commands, "train", _train, help="train a policy", extra="rl")
     add(train, "task", "its id")
@@ -53,6 +63,7 @@ def add_commands(commands: Commands) -> None:
     add(sweep, "--workers", "trials at a time; default 2", default=2)
     add(sweep, "--address", "of a running Ray cluster; default: one in this machine")
     add(sweep, "--out", "folder; seen by all machines", required=True)
+    add_how_trained(sweep)
 
 
 def _eval(arguments: argparse.Namespace) -> int:
@@ -66,12 +77,14 @@ def _eval(arguments: argparse.Namespace) -> int:
     tension. Intervals of means are Student's t over episodes, of success Wilson's, of the two
     ratios bootstrap. Nothing depends on --workers.
 
-    POLICY is scripted, off (no power), random, a shipped policy's name, a policy's file, or the
-    folder of a training run, whose best policy is taken.
+    POLICY is scripted, off (no power), random, a shipped policy's name, a policy's file, the
+    folder of a training run, whose best policy is taken, or a model that Stable-Baselines3 or
+    sb3-contrib has saved (.zip), which is read without running anything that is in it.
 
     examples:
       tca-mj eval scripted --task {task} --episodes 20 --randomise 0.2
       tca-mj eval runs/train/FOLDER --task TASK --workers 2
+      tca-mj eval walk.zip --task TASK --control-period 0.5
       tca-mj eval scripted --task TASK --model fine --timestep 0.002 --episodes 3
     """
     from tca_mj.agents.evaluate import REPORT, Evaluation, evaluate, report
@@ -79,7 +92,8 @@ def _eval(arguments: argparse.Namespace) -> int:
     name = f"{task_name(arguments.task)}-{Path(arguments.policy).stem}"
     out = arguments.out or Path("runs/eval") / name
     settings = ("task", "policy", "episodes", "seed", "randomise", "steps", "model", "timestep")
-    evaluation = Evaluation(**{key: getattr(arguments, key) for key in settings})
+    given = {key: getattr(arguments, key) for key in settings}
+    evaluation = Evaluation(**given, **how_trained(arguments))
     arguments.kept.append(f"what was finished is in {out}")
     summary = evaluate(evaluation, out=out, workers=arguments.workers, fresh=arguments.fresh)
     print(f"{report(summary)}\n\n{out / REPORT}")
@@ -179,13 +193,18 @@ def _sweep(arguments: argparse.Namespace) -> int:
           --set train.steps=40000
     """
     from tca_mj.agents.evaluate import Evaluation
+    from tca_mj.agents.policies import Preprocessing
     from tca_mj.agents.sweep import PAGE, TABLE, Sweep, run_sweep
 
     if (arguments.policy is None) == (arguments.algo is None):
         raise ValueError("give POLICY or --algo")
+    how = how_trained(arguments)
+    if arguments.algo and how != {"arguments": {}, "preprocessing": Preprocessing()}:
+        raise ValueError("how a model was trained is said of POLICY, not with --algo")
     evaluation = Evaluation(
-        task=arguments.task, policy=arguments.policy or "off", episodes=arguments.episodes
-    )
+        task=arguments.task, policy=arguments.policy or "off", episodes=arguments.episodes,
+        **how,
+    )  # fmt: skip
     sweep = Sweep(evaluation=evaluation, axes=dict(arguments.axes), algorithm=arguments.algo)
     try:
         run_sweep(sweep, arguments.out, workers=arguments.workers, address=arguments.address)

@@ -1,4 +1,4 @@
-"""To look at: ``demo`` records, ``export`` reads back, ``list`` names and ``view`` shows tasks."""
+"""To look at: ``demo`` records, ``export`` rewrites, ``list`` names and ``view`` shows tasks."""
 
 from __future__ import annotations
 
@@ -7,7 +7,16 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from tca_mj.cli.arguments import POLICIES, Commands, add, add_command, parse_option, task_name
+from tca_mj.cli.arguments import (
+    POLICIES,
+    Commands,
+    add,
+    add_command,
+    add_how_trained,
+    how_trained,
+    parse_option,
+    task_name,
+)
 from tca_mj.pages import table
 from tca_mj.registry import DEMOS, TASKS, find_task, make, task_class
 
@@ -33,16 +42,27 @@ def add_commands(commands: Commands) -> None:
     add(demo, "--video", "make the film, which takes most of the time",
         action=argparse.BooleanOptionalAction, default=True)  # fmt: skip
 
-    export = add_command(commands, "export", _export, help="write a recording's curves as a table")
-    add(export, "recording", "a .rrd file", type=Path)
-    add(export, "--csv", "file to write; default: beside the recording", type=Path)
+    export = add_command(
+        commands, "export", _export, help="write a recording as a table, a policy as ONNX",
+        extra="onnx",
+    )  # fmt: skip
+    add(export, "source", "a recording (.rrd), or with --onnx or --npz a policy: its file or name",
+        metavar="FILE")  # fmt: skip
+    into = export.add_mutually_exclusive_group()
+    add(into, "--csv", "table to write; default: beside the recording", type=Path)
+    add(into, "--onnx", "network to write, for other runtimes", type=Path)
+    add(into, "--npz", "policy to write, which says what its task is made with", type=Path)
+    add(export, "--task", "what a .zip was trained in")
 
     tasks = add_command(commands, "list", _list, help="list the tasks, with their spaces")
     add(tasks, "task", "only these, or module:id", nargs="*")
 
     view = add_command(commands, "view", _view, help="watch a task in a window")
     add(view, "task", "its id")
-    add(view, "--policy", f"{', '.join(POLICIES)}, a shipped one or a file", default="scripted")
+    add(view, "--policy", f"{', '.join(POLICIES)}, a shipped one, a file or a run",
+        default="scripted")  # fmt: skip
+    for parser in (demo, view, export):
+        add_how_trained(parser)
     for parser in (demo, view):
         add(parser, "--seed", "of the first episode; default 0")
         add(parser, "--option", "an option of the task's reset; may be given several times",
@@ -65,6 +85,7 @@ def _demo(arguments: argparse.Namespace) -> int:
       tca-mj demo {demo} --seed 7 --no-video      much faster
       tca-mj demo --policy scripted --task {task} --option NAME=VALUE
       tca-mj demo --policy runs/train/FOLDER --task my_robots:Mine/Reach-v0
+      tca-mj demo --policy walk.zip --task {task} --control-period 0.5
     """
     from tca_mj.agents.demo import play
 
@@ -76,7 +97,7 @@ def _demo(arguments: argparse.Namespace) -> int:
     arguments.kept.append(f"what was recorded is in {out}")
     summary = play(
         task, "scripted" if named else arguments.policy, seed=arguments.seed, out=out,
-        options=dict(arguments.options), video=arguments.video,
+        options=dict(arguments.options), video=arguments.video, **how_trained(arguments),
     )  # fmt: skip
     if len(summary.get("speeds", ())) > 1:
         print(speed_table(summary))
@@ -120,14 +141,27 @@ def _export(arguments: argparse.Namespace) -> int:
     """Writes the curves of a recording as one table: a row for every time, a column with its unit
     for every curve. In Python, `tca_mj.record.reader.read` gives the same as arrays.
 
+    With --onnx, writes the network of a policy for other runtimes: `observation`, float32 of shape
+    (batch, n) in the units of the task, becomes `action`; normalisation is part of it. Needs
+    `pip install 'tca-mj[onnx]'`. With --npz, writes a model of Stable-Baselines3 as a policy of
+    this package, which then says itself what is said of it here.
+
     examples:
       tca-mj export runs/demo/{demo}/rollout.rrd
       tca-mj export rollout.rrd --csv curves.csv
+      tca-mj export walk.zip --task {task} --control-period 0.5 --npz walk.npz
+      tca-mj export walk.npz --onnx walk.onnx
     """
+    if arguments.onnx or arguments.npz:
+        from tca_mj.agents.policies import saved_policy
+
+        policy = saved_policy(arguments.source, arguments.task, **how_trained(arguments))
+        print(policy.to_onnx(arguments.onnx) if arguments.onnx else policy.save(arguments.npz))
+        return 0
     from tca_mj.record.reader import read, write_csv
 
-    path = arguments.csv or arguments.recording.with_suffix(".csv")
-    recording = read(arguments.recording)
+    path = arguments.csv or Path(arguments.source).with_suffix(".csv")
+    recording = read(arguments.source)
     write_csv(recording, path)
     print(f"{path}: {len(recording.curves)} curves")
     return 0
@@ -161,11 +195,13 @@ def _view(arguments: argparse.Namespace) -> int:
     episode, = and - change the speed, ] goes to the next camera, F1 lists all keys.
 
     Policies: scripted (the task's own), off (no power), random, the name of one that comes with the
-    package (`tca-mj list` shows them), or the file of a trained one.
+    package (`tca-mj list` shows them), the file of a trained one, or a model that Stable-Baselines3
+    or sb3-contrib has saved (.zip).
 
     examples:
       tca-mj view {task}
       tca-mj view {task} --policy random --seed 1
+      tca-mj view {task} --policy walk.zip --control-period 0.5
     """
     from tca_mj.envs.viewer import NoDisplay, ViewerPolicy, launch, need_display
 
@@ -176,8 +212,9 @@ def _view(arguments: argparse.Namespace) -> int:
         return 2
     from tca_mj.agents.policies.actors import actor, arguments_of
 
-    env = make(arguments.task, **arguments_of(arguments.policy, arguments.task))
-    found = actor(arguments.policy, env, seed=arguments.seed)
+    how, policy = how_trained(arguments), arguments.policy
+    env = make(arguments.task, **arguments_of(policy, arguments.task) | how["arguments"])
+    found = actor(policy, env, seed=arguments.seed, preprocessing=how["preprocessing"])
     print("space starts and pauses, backspace begins the next episode, F1 lists all keys")
     launch(env, ViewerPolicy(found.act, found.reset), seed=arguments.seed,
            options=dict(arguments.options) or None, title=arguments.task)  # fmt: skip
