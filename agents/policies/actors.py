@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from tca_mj.agents.policies import Policy, Preprocessing, SavedPolicy, load_policy
 from tca_mj.agents.policies.gait import GaitPolicy
-from tca_mj.agents.policies.load import ZIP, find, require_arguments
+from tca_mj.agents.policies.load import ZIP, find, require_arguments, require_untold
 from tca_mj.control import Gait
 from tca_mj.registry import make, task_class
 
@@ -61,6 +61,7 @@ def actor(
     """
     if str(name) not in NAMES:
         return load_policy(name, env, preprocessing)
+    require_untold(name, preprocessing)
     if name == "scripted":
         return scripted(env)
     if name == "random":

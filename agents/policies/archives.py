@@ -31,17 +31,17 @@ _CONSTANTS = {"NONE": None, "NEWTRUE": True, "NEWFALSE": False}
 _PLAIN = ("GLOBAL", "BINUNICODE", "BININT", "BININT1", "BININT2", "LONG1")
 
 
-def content_of(path: str | Path, largest: int = LARGEST) -> bytes:
+def content_of(path: str | Path) -> bytes:
     """A file's content.
 
     Raises:
         FileNotFoundError: If there is none.
-        ValueError: If it is larger than it may be.
+        ValueError: If it is larger than ``LARGEST``.
     """
     with Path(path).open("rb") as file:
-        content = file.read(largest + 1)
-    if len(content) > largest:
-        raise ValueError(f"file must have at most {largest} bytes, got more")
+        content = file.read(LARGEST + 1)
+    if len(content) > LARGEST:
+        raise ValueError(f"file must have at most {LARGEST} bytes, got more")
     return content
 
 
@@ -72,8 +72,8 @@ class Archive:
         if len(set(self.names)) != len(self.names):
             raise ValueError("members must have different names, got two of the same")
 
-    def read(self, name: str, longest: int = LARGEST) -> bytes:
-        """Unpacks a member.
+    def read(self, name: str, longest: int | None = None) -> bytes:
+        """Unpacks a member, of at most ``longest`` bytes if that is said.
 
         Raises:
             ValueError: If there is none, or it is too large.
@@ -83,7 +83,7 @@ class Archive:
             raise ValueError(f"a member {name!r} is missing")
         if self._zip.getinfo(name).compress_type not in (ZIP_STORED, ZIP_DEFLATED):
             raise ValueError(f"{name!r} must be stored or deflated")
-        most = min(longest, self._left)
+        most = self._left if longest is None else min(longest, self._left)
         with self._zip.open(name) as file:
             content = file.read(most + 1)
         if len(content) > most:
@@ -109,8 +109,7 @@ def _array(content: bytes) -> NDArray[Any]:
     readers = {(1, 0): np.lib.format.read_array_header_1_0,
                (2, 0): np.lib.format.read_array_header_2_0}  # fmt: skip
     shape, fortran, dtype = readers[np.lib.format.read_magic(file)](file)
-    if dtype.hasobject:
-        raise ValueError("arrays must be of numbers or text, got objects")
+    # Refuses objects, and what is said to be larger than it is.
     flat = np.frombuffer(content, dtype, count=math.prod(shape), offset=file.tell())
     return flat.reshape(shape, order="F" if fortran else "C")
 

@@ -46,7 +46,8 @@ def load_policy(
     path = find(source)
     if path.suffix == ZIP:
         return read_zip(path, env, preprocessing).make(env)
-    saved = _own(path, preprocessing)
+    require_untold(path, preprocessing)
+    saved = SavedPolicy.read(path)
     spec = env.spec
     if spec is not None and spec.id != saved.task.rpartition(":")[2]:
         raise ValueError(f"{source} is a policy for {saved.task}, not for {spec.id}")
@@ -76,7 +77,8 @@ def saved_policy(
     """
     path = find(source)
     if path.suffix != ZIP:
-        return _own(path, preprocessing)
+        require_untold(path, preprocessing)
+        return SavedPolicy.read(path)
     if task is None:
         raise ValueError(f"task must name what {path} was trained in, got none (--task)")
     env = make(task, disable_env_checker=True, **(arguments or {}))
@@ -175,11 +177,10 @@ def read_zip(path: str | Path, env: Any, preprocessing: Preprocessing | None = N
     )
 
 
-def _own(path: Path, preprocessing: Preprocessing | None) -> SavedPolicy:
-    """A policy of this package, whose file says how it sees."""
+def require_untold(source: str | Path, preprocessing: Preprocessing | None) -> None:
+    """Raises ValueError if somebody says how a policy sees that knows it itself."""
     if preprocessing not in (None, Preprocessing()):
-        raise ValueError(f"policy must be a {ZIP} to be told how it was trained, got {path}")
-    return SavedPolicy.read(path)
+        raise ValueError(f"policy must be a {ZIP} to be told how it sees the task, got {source}")
 
 
 def _require_spaces(path: str | Path, network: Network, own: int, env: Any) -> None:

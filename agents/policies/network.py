@@ -22,7 +22,7 @@ def _positive_or_none(name: str, value: Any) -> None:
 
 MaybePositive = Annotated[float | None, _positive_or_none]
 
-ACTIVATIONS: dict[str, Callable[[Floats], Floats]] = {
+ACTIVATIONS: dict[str, Callable[[NDArray[np.float64]], NDArray[np.float64]]] = {
     "tanh": np.tanh,
     "relu": lambda h: np.maximum(h, 0.0),
     "elu": lambda h: np.where(h > 0.0, h, np.expm1(np.minimum(h, 0.0))),
@@ -39,6 +39,8 @@ class Network(Checked):
     The observation x, in ``units`` where there are any, becomes
     clip((x - mean)/sqrt(var + epsilon), ±clip), passes through the layers W h + b with the
     activation between them, is kept within ±limit, and is squashed to what lies within ``bounds``.
+    What the layers see is float32, as when they learned; they are computed in float64, where it
+    makes no difference in which order a library adds up.
 
     Attributes:
         weights: One matrix per layer, shape (out, in), float32.
@@ -119,17 +121,14 @@ class Network(Checked):
         seen = (seen - self.mean) / np.sqrt(self.var + self.epsilon)
         if self.clip is not None:
             seen = np.clip(seen, -self.clip, self.clip)
-        hidden: Floats = seen.astype(np.float32)
+        hidden = seen.astype(np.float32).astype(np.float64)
         for i, (weight, bias) in enumerate(zip(self.weights, self.biases, strict=True)):
             hidden = weight @ hidden + bias
             if i + 1 < len(self.weights):
                 hidden = ACTIVATIONS[self.activation](hidden)
         if self.limit is not None:
             hidden = np.clip(hidden, -self.limit, self.limit)
-        if self.squash == "clip":
-            return np.clip(hidden, *((-1.0, 1.0) if self.bounds is None else self.bounds))
-        hidden = np.tanh(hidden)
-        if self.bounds is None:
-            return hidden
-        low, high = self.bounds
-        return low + 0.5 * (hidden + 1.0) * (high - low)
+        low, high = (-1.0, 1.0) if self.bounds is None else self.bounds.astype(np.float64)
+        if self.squash == "tanh":
+            hidden = low + 0.5 * (np.tanh(hidden) + 1.0) * (high - low)
+        return np.clip(hidden, low, high).astype(np.float32)

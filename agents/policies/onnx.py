@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Callable, Mapping
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -11,13 +11,18 @@ from tca_mj.agents.policies.network import Network
 
 OPSET, IR_VERSION = 17, 8  # of 2022: what runtimes since then read
 
-# An activation as nodes: operator, attributes, and whether it is a factor of its input.
-_ACTIVATIONS: dict[str, tuple[str, dict[str, Any], bool]] = {
-    "tanh": ("Tanh", {}, False),
-    "relu": ("Relu", {}, False),
-    "elu": ("Elu", {"alpha": 1.0}, False),
-    "leaky_relu": ("LeakyRelu", {"alpha": 0.01}, False),
-    "silu": ("Sigmoid", {}, True),
+Node: TypeAlias = Callable[..., str]
+"""Adds an operator on values (by name) and constants, and returns the name of what it gives."""
+
+# Of operators that runtimes have in float64.
+_ACTIVATIONS: dict[str, Callable[[Node, str], str]] = {
+    "tanh": lambda node, x: node("Tanh", x),
+    "relu": lambda node, x: node("Max", x, 0.0),
+    "elu": lambda node, x: node(
+        "Add", node("Max", x, 0.0), node("Sub", node("Exp", node("Min", x, 0.0)), 1.0)
+    ),
+    "leaky_relu": lambda node, x: node("Max", x, node("Mul", x, 0.01)),
+    "silu": lambda node, x: node("Mul", x, node("Sigmoid", x)),
 }
 
 
@@ -25,8 +30,8 @@ def onnx_model(network: Network, about: Mapping[str, str]) -> bytes:
     """A network as an ONNX model, with all that it does.
 
     Its input is ``observation``, float32 of shape (batch, inputs), in the units of the task, its
-    output ``action``, float32 of shape (batch, outputs). Normalisation is done in float64, as the
-    network does it.
+    output ``action``, float32 of shape (batch, outputs). It computes in float64 what the network
+    does, so that both are the same to the last digit or two of float32.
 
     Args:
         network: The network.
@@ -42,54 +47,40 @@ def onnx_model(network: Network, about: Mapping[str, str]) -> bytes:
 
     nodes: list[Any] = []
     constants: list[Any] = []
-    value = "observation"
 
-    def then(operator: str, *arrays: Any, name: str = "", **attributes: Any) -> None:
-        """The next operator on the value, with arrays as its other inputs."""
-        nonlocal value
-        inputs = [value]
-        for array in arrays:
-            inputs.append(f"constant_{len(constants)}")
-            constants.append(numpy_helper.from_array(np.asarray(array), inputs[-1]))
-        value = name or f"value_{len(nodes)}"
-        nodes.append(helper.make_node(operator, inputs, [value], **attributes))
+    def node(operator: str, *inputs: Any, name: str = "", **attributes: Any) -> str:
+        names = []
+        for each in inputs:
+            if not isinstance(each, str):
+                constants.append(numpy_helper.from_array(np.asarray(each), f"c{len(constants)}"))
+            names.append(each if isinstance(each, str) else constants[-1].name)
+        name = name or f"x{len(nodes)}"
+        nodes.append(helper.make_node(operator, names, [name], **attributes))
+        return name
 
-    single, double = np.float32, np.float64
+    def double(array: Any) -> Any:
+        return np.asarray(array, np.float64)
+
+    x = "observation"
     if network.units is not None:
-        then("Sub", network.units[0].astype(single))
-        then("Div", network.units[1].astype(single))
-    deviation = np.sqrt(network.var + network.epsilon).astype(double)
-    if network.mean.any() or (deviation != 1.0).any() or network.clip is not None:
-        then("Cast", to=TensorProto.DOUBLE)
-        then("Sub", network.mean.astype(double))
-        then("Div", deviation)
-        if network.clip is not None:
-            then("Clip", double(-network.clip), double(network.clip))
-        then("Cast", to=TensorProto.FLOAT)
-    operator, attributes, factor = _ACTIVATIONS[network.activation]
+        centre, scale = network.units.astype(np.float32)
+        x = node("Div", node("Sub", x, centre), scale)
+    x = node("Cast", x, to=TensorProto.DOUBLE)
+    x = node("Sub", x, double(network.mean))
+    x = node("Div", x, np.sqrt(double(network.var) + network.epsilon))
+    if network.clip is not None:
+        x = node("Clip", x, double(-network.clip), double(network.clip))
+    x = node("Cast", node("Cast", x, to=TensorProto.FLOAT), to=TensorProto.DOUBLE)
     for i, (weight, bias) in enumerate(zip(network.weights, network.biases, strict=True)):
-        if i:
-            before = value
-            then(operator, **attributes)
-            if factor:
-                nodes.append(helper.make_node("Mul", [before, value], [f"product_{i}"]))
-                value = f"product_{i}"
-        then("Gemm", weight, bias, transB=1)
+        x = _ACTIVATIONS[network.activation](node, x) if i else x
+        x = node("Gemm", x, double(weight), double(bias), transB=1)
     if network.limit is not None:
-        then("Clip", single(-network.limit), single(network.limit))
-    row = np.ones(network.outputs, single)
-    low, high = np.array([-row, row] if network.bounds is None else network.bounds, single)
-    if network.squash == "clip":
-        then("Max", low)
-        then("Min", high)
-    else:
-        then("Tanh")
-        if network.bounds is not None:
-            then("Add", single(1.0))
-            then("Mul", single(0.5))
-            then("Mul", high - low)
-            then("Add", low)
-    then("Identity", name="action")
+        x = node("Clip", x, double(-network.limit), double(network.limit))
+    row = np.ones(network.outputs)
+    low, high = double([-row, row] if network.bounds is None else network.bounds)
+    if network.squash == "tanh":
+        x = node("Add", node("Mul", node("Add", node("Tanh", x), 1.0), 0.5 * (high - low)), low)
+    node("Cast", node("Min", node("Max", x, low), high), name="action", to=TensorProto.FLOAT)
     ends = [
         helper.make_tensor_value_info(name, TensorProto.FLOAT, ["batch", width])
         for name, width in (("observation", network.inputs), ("action", network.outputs))

@@ -24,6 +24,7 @@ from tca_mj.agents.policies.archives import LONGEST, Archive, content_of, tensor
 from tca_mj.agents.policies.files import Origin
 from tca_mj.agents.policies.network import Floats, Network
 from tca_mj.agents.policies.preprocessing import Statistics
+from tca_mj.checks import require_one_of, within
 
 Doubles: TypeAlias = NDArray[np.float64]
 
@@ -78,7 +79,8 @@ class Model:
                 a row of numbers to a row of numbers.
         """
         try:
-            return _model(content_of(path), Path(path).name)
+            with np.errstate(all="ignore"):  # what overflows is refused as not finite
+                return _model(content_of(path), Path(path).name)
         except FileNotFoundError:
             raise
         except Exception as error:
@@ -99,6 +101,10 @@ class Model:
         network = self.network
         if statistics is None:
             return replace(network, units=units)
+        if len(statistics.mean) != network.inputs:
+            raise ValueError(
+                f"statistics must be of {network.inputs} numbers, got {len(statistics.mean)}"
+            )
         # What the network has of its own, a batch normalisation, moves into its first layer.
         weight, bias = _folded(network.mean, network.var, network.weights[0], network.biases[0])
         return replace(
@@ -135,20 +141,23 @@ def _model(content: bytes, name: str) -> Model:
                 " dictionaries, memory and shared layers are not read"
             )
     layers = list(_layers(found, prefixes, _number(settings, "batch_norm_eps", _BATCH_NORM_EPS)))
+    if not layers:
+        raise ValueError(f"policy must have layers at {' and '.join(prefixes)}, got none")
     (mean, var, *first), *others = layers
     linear = [first, *(_folded(*layer) for layer in others)]
     if module.endswith("ars.policies") and not others and "net_arch" not in settings:
         squashed = False  # ARSLinearPolicy
     squashed = settings.get("squash_output", squashed)
-    within = f"{prefixes[-1]}.0.weight" in found and len(prefixes) == 2  # gSDE
-    limit = _number(settings, "clip_mean", _CLIP_MEAN) if within else None
+    require_one_of("squash_output", squashed, (True, False))
+    kept = f"{prefixes[-1]}.0.weight" in found and len(prefixes) == 2  # of gSDE
+    limit = _number(settings, "clip_mean", _CLIP_MEAN) if kept else None
     return Model(
         network=Network(
             weights=tuple(weight for weight, _ in linear),
             biases=tuple(bias for _, bias in linear),
             mean=mean, var=var, clip=None, epsilon=0.0, limit=limit,
             activation=_activation(settings.get("activation_fn", _TORCH.format(activation))),
-            squash={True: "tanh", False: "clip"}[squashed],
+            squash="tanh" if squashed else "clip",
             bounds=None if (acts == [[-1.0], [1.0]]).all() else acts.astype(np.float32),
         ),
         seen=seen,
@@ -184,7 +193,7 @@ def _layers(
             inputs, bias = weight.shape[1], values.get("bias", np.zeros(weight.shape[0]))
             mean, var = norm.get("ra_mean", np.zeros(inputs)), np.ones(inputs)
             if norm:
-                var = norm["ra_var"].astype(np.float64) + epsilon
+                var = within("ra_var", norm["ra_var"] + epsilon, above=0.0, shape=(inputs,))
                 bias = bias + weight.astype(np.float64) @ norm["bias"]
                 weight = weight.astype(np.float64) * norm["scale"]
             yield mean.astype(np.float64), var, _single(weight), _single(bias)
