@@ -7,6 +7,7 @@ import pickle
 import struct
 import subprocess
 import sys
+import tracemalloc
 import warnings
 import zipfile
 from pathlib import Path
@@ -432,6 +433,17 @@ def test_memory_is_bounded_whatever_a_file_declares(
     with pytest.raises(ValueError, match="file must have at most 1048576 bytes, got more"):
         Model.read(bare)
     rewritten(bare, policy_pth=None, other_pth=None)
+    content = io.BytesIO()
+    with zipfile.ZipFile(content, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("policy.pth", bytes(2**24))
+    lie = bytearray(content.getvalue())  # a kilobyte, it says in both places
+    struct.pack_into("<L", lie, 22, 1000)
+    struct.pack_into("<L", lie, lie.index(b"PK\x01\x02") + 24, 1000)
+    tracemalloc.start()
+    with pytest.raises(zipfile.BadZipFile, match="CRC"):
+        archives.Archive(bytes(lie)).read("policy.pth")
+    assert tracemalloc.get_traced_memory()[1] < 2**18
+    tracemalloc.stop()
     with zipfile.ZipFile(bare, "a", zipfile.ZIP_LZMA) as archive:
         archive.writestr("policy.pth", bytes(2**24))
     with pytest.raises(ValueError, match="'policy.pth' must be stored or deflated"):

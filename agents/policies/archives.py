@@ -81,14 +81,15 @@ class Archive:
         """
         if name not in self.names:
             raise ValueError(f"a member {name!r} is missing")
-        if self._zip.getinfo(name).compress_type not in (ZIP_STORED, ZIP_DEFLATED):
+        about = self._zip.getinfo(name)
+        if about.compress_type not in (ZIP_STORED, ZIP_DEFLATED):
             raise ValueError(f"{name!r} must be stored or deflated")
         most = self._left if longest is None else min(longest, self._left)
+        if about.file_size > most:
+            raise ValueError(f"{name!r} must unpack to at most {most} bytes, got {about.file_size}")
+        self._left -= about.file_size
         with self._zip.open(name) as file:
-            content = file.read(most + 1)
-        if len(content) > most:
-            raise ValueError(f"{name!r} must unpack to at most {most} bytes, got more")
-        self._left -= len(content)
+            content = file.read(about.file_size)  # no more, even if there is more
         return content
 
 
