@@ -49,6 +49,7 @@ INTERNAL = {
         "task": "broken_off how_it_ended parts together",
     },
     "tca_mj.agents": {"evaluate": "endings report", "output": "*", "workers": "*"},
+    "tca_mj.agents.policies": {"archives": "*", "load": "require_untold", "onnx": "*"},
     "tca_mj.agents.scripts": {
         # one for each task, found by the task's ``scripted``
         "arm": "scripted", "morph": "calibrate scripted",

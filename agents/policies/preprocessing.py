@@ -19,9 +19,10 @@ class Statistics(Checked):
     """By what ``VecNormalize`` normalised the observations of a model.
 
     Attributes:
-        mean, var: Of each number of an observation.
-        clip: Largest size of a normalised number; None for no limit.
-        epsilon: Added to the variance.
+        mean: Of each number of an observation as the model saw it [their units].
+        var: Variance of each [their units squared].
+        clip: Largest size of a normalised number [1]; None for no limit.
+        epsilon: Added to the variance [as ``var``].
 
     Raises:
         ValueError: If clip or epsilon is out of range.
