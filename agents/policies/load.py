@@ -15,6 +15,7 @@ from tca_mj.agents.policies.network import Network
 from tca_mj.agents.policies.preprocessing import Preprocessing
 from tca_mj.agents.policies.sb3_zip import Model
 from tca_mj.envs.task import HEATINGS
+from tca_mj.hints import nearest
 from tca_mj.registry import find_task, make
 
 ZIP = ".zip"  # of a model of Stable-Baselines3
@@ -130,6 +131,7 @@ def find(source: str | Path) -> Path:
         return known[str(source)]
     raise FileNotFoundError(
         f"no file {path}, and no shipped policy of that name; shipped are {sorted(known)}"
+        f"{nearest(str(source), known)}"
     )
 
 
