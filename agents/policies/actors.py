@@ -128,4 +128,3 @@ def first_gait(task: str, start: str) -> tuple[Gait, tuple[float, ...]]:
         raise ValueError(f"start must be a policy with a gait: the script of {task} has none")
     gait = replace(script.gait, offset=TROT) if start == "trot" else script.gait
     return gait, tuple(np.broadcast_to(script.steering, gait.legs).tolist())
-

@@ -245,4 +245,3 @@ def _activation(said: str) -> str:
 def _version(archive: Archive) -> str:
     name = "_stable_baselines3_version"
     return archive.read(name, 100).decode().strip() if name in archive.names else "unknown"
-
