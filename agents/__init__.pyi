@@ -1,7 +1,8 @@
 from tca_mj.agents.demo import play
 from tca_mj.agents.design import designed, robot_of
 from tca_mj.agents.episode import Episode
-from tca_mj.agents.evaluate import METRICS, Evaluation, cell, figures, kept, label, run_episode
+from tca_mj.agents.evaluate import METRICS, Evaluation, cell, figures, label, run_episode
+from tca_mj.agents.finished import kept
 from tca_mj.agents.rollout import Step, earned, tally
 from tca_mj.agents.sweep import Sweep, Trial, run_sweep
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,7 @@ from tca_mj.agents.episode import PLOT, RECORDING, VIDEO, Episode
 from tca_mj.agents.policies import Policy, Preprocessing
 from tca_mj.agents.policies.actors import actor, arguments_of
 from tca_mj.checks import require_positive
+from tca_mj.files import claimed
 from tca_mj.registry import make
 
 
@@ -50,7 +52,7 @@ def play(
         video: Whether to make the film, which takes longer than the simulation.
         speed: Simulated seconds per second of film [1]; None for what suits the task.
         max_duration: Simulated time after which to stop [s]; None for the task's own limit.
-        progress: Whether to show a progress bar, where there is a terminal.
+        progress: Whether to show how far it is.
 
     Returns:
         The summary, None in place of numbers that a diverged end does not have, with
@@ -72,6 +74,8 @@ def play(
     Raises:
         FileNotFoundError: If there is no such policy.
         ValueError: If it is for another task, or an argument cannot be used.
+        BlockingIOError: If another process works in ``out``.
+        OSError: If something cannot be written.
         KeyboardInterrupt: As it came, after everything was written.
 
     Example:
@@ -94,8 +98,9 @@ def play(
     )  # fmt: skip
     name = str(policy) if named else type(policy).__name__
     files = (RECORDING, VIDEO, PLOT) if video else (RECORDING, PLOT)
-    episode = Episode(
-        env, acting, names=(task, name), seed=seed, out=out, options=options, files=files
-    )
-    limit = min(max_duration or np.inf, episode.limit)
-    return episode.run(limit, speed=speed or episode.task.film_speed, progress=progress)
+    with nullcontext() if out is None else claimed(out):
+        episode = Episode(
+            env, acting, names=(task, name), seed=seed, out=out, options=options, files=files
+        )
+        limit = min(max_duration or np.inf, episode.limit)
+        return episode.run(limit, speed=speed or episode.task.film_speed, progress=progress)

@@ -1,6 +1,6 @@
 """How good a policy is: episodes of a task, their figures, means and intervals.
 
-Each finished episode is one line of ``episodes.jsonl``; a second run goes on where the first one
+Finished episodes are kept (``tca_mj.agents.finished``); a second run goes on where the first one
 stopped. An episode depends on its seed and on the settings alone, not on the process that runs it
 or on the episodes before it.
 """
@@ -9,9 +9,9 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import nullcontext
 from dataclasses import asdict, dataclass, field
 from functools import partial
 from pathlib import Path
@@ -20,22 +20,23 @@ from typing import Annotated, Any
 import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
-from tqdm import tqdm
 
 import tca_mj  # noqa: F401  (registers the tasks in a new process)
 from tca_mj.agents.design import robot_of
+from tca_mj.agents.finished import EPISODES, begun, keep
 from tca_mj.agents.policies import Policy, Preprocessing
 from tca_mj.agents.policies.actors import NAMES, actor, arguments_of
 from tca_mj.agents.policies.load import find
+from tca_mj.agents.progress import progress_bar
 from tca_mj.agents.rollout import rollout
 from tca_mj.agents.workers import Workers
 from tca_mj.checks import Checked, Count, number, require_count
-from tca_mj.files import write_whole
+from tca_mj.files import claimed
 from tca_mj.machine import machine, versions
 from tca_mj.pages import table, write_result
 from tca_mj.registry import make, task_class
 
-EPISODES, REPORT = "episodes.jsonl", "summary.md"
+REPORT = "summary.md"
 
 # Name, unit, factor to the unit, and digits of what is reported.
 METRICS = {
@@ -208,7 +209,7 @@ def evaluate(
         workers: Processes; nothing depends on their number.
         fresh: Whether to run again what the folder holds. Episodes of other settings, policies or
             versions of packages are not taken; changes of the code are not seen.
-        progress: Whether to show a progress bar, where there is a terminal.
+        progress: Whether to show how far it is.
 
     Returns:
         ``settings``, ``key``, ``figures`` (see ``figures``), ``episodes`` by seed, ``versions``,
@@ -217,6 +218,8 @@ def evaluate(
     Raises:
         FileNotFoundError: If there is no such policy.
         ValueError: If it is for another task, or ``workers`` is below 1.
+        BlockingIOError: If another process works in ``out``.
+        OSError: If something cannot be written.
         KeyboardInterrupt: As it came; the episodes that were finished are kept.
     """
     require_count(workers=workers)
@@ -225,20 +228,27 @@ def evaluate(
     evaluation.actor(env, evaluation.seed)  # before any process starts: who is wrong is told now
     env.close()
     seeds = range(evaluation.seed, evaluation.seed + evaluation.episodes)
-    path = None if out is None else out / EPISODES
-    done = {} if path is None or fresh else kept(path, key)
-    if path is not None:
-        _begin(path, fresh, key)
-    missing = [seed for seed in seeds if seed not in done]
-    bar = tqdm(total=len(seeds), initial=len(seeds) - len(missing), unit="episode",
-               disable=None if progress else True)  # fmt: skip
-    with bar, Workers(min(workers, len(missing))) as processes:
-        for _, row in processes.run(run_episode, [(evaluation, seed) for seed in missing]):
-            done[row["seed"]] = row
-            if path is not None:
-                _append(path, {"key": key, **row})
-            bar.update()
-    rows = [done[seed] for seed in seeds]
+    with nullcontext() if out is None else claimed(out):
+        done = {} if out is None else begun(out / EPISODES, key, fresh=fresh)
+        missing = [seed for seed in seeds if seed not in done]
+        bar = progress_bar(
+            len(seeds), unit="episodes", done=len(seeds) - len(missing), progress=progress
+        )
+        with bar, Workers(min(workers, len(missing))) as processes:
+            for _, row in processes.run(run_episode, [(evaluation, seed) for seed in missing]):
+                done[row["seed"]] = row
+                if out is not None:
+                    keep(out / EPISODES, key, row)
+                mean = np.mean([row["return"] for row in done.values()])
+                bar.set_postfix({"return": f"{mean:.2f}"}, refresh=False)
+                bar.update()
+        return _summed_up(evaluation, [done[seed] for seed in seeds], key, out)
+
+
+def _summed_up(
+    evaluation: Evaluation, rows: list[dict[str, Any]], key: str, out: Path | None
+) -> dict[str, Any]:
+    """The summary, which is also written."""
     summary = {
         "settings": asdict(evaluation),
         "key": key,
@@ -249,39 +259,6 @@ def evaluate(
     }
     write_result(out, "summary", summary, report(summary))
     return summary
-
-
-def kept(path: Path, key: str) -> dict[int, dict[str, Any]]:
-    """Episodes in a file that have ``key``, by seed; a line that was cut off is skipped.
-
-    Args:
-        path: The file, one JSON object a line.
-        key: What ``Evaluation.key`` says.
-    """
-    found = {}
-    for line in path.read_text(encoding="utf-8").splitlines() if path.exists() else ():
-        try:
-            row = json.loads(line)
-        except ValueError:
-            continue
-        if row.pop("key", None) == key:
-            found[row["seed"]] = row
-    return found
-
-
-def _begin(path: Path, fresh: bool, key: str) -> None:
-    """Ends a line that was cut off; without the episodes of ``key`` if they are to be run again."""
-    lines = path.read_text(encoding="utf-8").splitlines() if path.exists() else []
-    if fresh:
-        lines = [line for line in lines if f'"key": "{key}"' not in line]
-    write_whole(path, "".join(line + "\n" for line in lines).encode())
-
-
-def _append(path: Path, row: dict[str, Any]) -> None:
-    with path.open("a", encoding="utf-8") as file:
-        file.write(json.dumps(row, ensure_ascii=False) + "\n")
-        file.flush()
-        os.fsync(file.fileno())
 
 
 def figures(rows: Sequence[dict[str, Any]]) -> dict[str, dict[str, float | None]]:

@@ -12,11 +12,31 @@ from tca_mj.files import write_whole
 
 Row = Mapping[str, Any]
 
+_MOST = 1 << 24  # size of a file that is read [bytes]
+
 
 def write_json(path: Path, value: Any, *, indent: int = 2) -> Path:
     """Writes a value as JSON."""
     text = json.dumps(value, indent=indent, ensure_ascii=False)
     return write_whole(path, f"{text}\n".encode())
+
+
+def read_json(path: Path) -> dict[str, Any]:
+    """Reads an object from a file of JSON.
+
+    Raises:
+        ValueError: If it holds anything else, or more than 16 MB.
+        OSError: If it cannot be read.
+    """
+    with path.open("rb") as file:
+        content = file.read(_MOST + 1)
+    try:
+        found = json.loads(content) if len(content) <= _MOST else None
+    except (ValueError, RecursionError):
+        found = None
+    if not isinstance(found, dict):
+        raise ValueError(f"{path} must hold an object as JSON: it is broken, or another file")
+    return found
 
 
 def write_csv(path: Path, rows: Sequence[Row], columns: Sequence[str] = ()) -> Path:

@@ -16,7 +16,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from tca_mj.agents.evaluate import EPISODES, METRICS, Evaluation, cell, evaluate, figures, kept
+from tca_mj.agents.evaluate import METRICS, Evaluation, cell, evaluate, figures
+from tca_mj.agents.finished import EPISODES, kept
 from tca_mj.agents.policies import SavedPolicy, shipped
 from tca_mj.registry import TASKS, task_class
 

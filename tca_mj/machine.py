@@ -2,7 +2,8 @@
 
 import os
 import platform
-from importlib.metadata import PackageNotFoundError, version
+import shlex
+from importlib.metadata import PackageNotFoundError, requires, version
 from pathlib import Path
 
 # Distributions whose version changes results or files.
@@ -22,6 +23,16 @@ def versions(*more: str) -> dict[str, str]:
         except PackageNotFoundError:
             found[name] = "not installed"
     return found
+
+
+def how_to_install(extra: str) -> str:
+    """The command that installs the packages of an extra, under the names that an index has."""
+    try:
+        everything = requires("tca-mj") or []
+    except PackageNotFoundError:  # a checkout that is not installed
+        return f"pip install -e '.[{extra}]'"
+    needed = [text.partition(";")[0] for text in everything if text.endswith(f'"{extra}"')]
+    return f"pip install {shlex.join(needed)}"
 
 
 def machine() -> dict[str, str | int]:

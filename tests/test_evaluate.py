@@ -12,7 +12,8 @@ import tca_mj  # noqa: F401  (registers the ids)
 from tca_mj import cli
 from tca_mj.agents import evaluate as module
 from tca_mj.agents.demo import play
-from tca_mj.agents.evaluate import EPISODES, Evaluation, cell, evaluate, figures, report
+from tca_mj.agents.evaluate import Evaluation, cell, evaluate, figures, report
+from tca_mj.agents.finished import EPISODES
 from tca_mj.agents.policies import Origin, SavedPolicy
 from tca_mj.agents.policies.actors import actor, arguments_of
 from tca_mj.agents.scripts.tetrapod import WALK

@@ -24,7 +24,7 @@ import tca_mj
 INTERNAL = {
     "tca_mj": {
         "actuation": "muscle_group", "bench": "*", "checks": "*", "couple": "*", "files": "*",
-        "hints": "*", "lazy": "*", "machine": "*", "pages": "*", "quadrature": "*",
+        "forks": "*", "hints": "*", "lazy": "*", "machine": "*", "pages": "*", "quadrature": "*",
         "routes": "require_route", "testing": "*",
     },
     "tca_mj.tca": {
@@ -40,7 +40,8 @@ INTERNAL = {
     "tca_mj.model": {"curves": "*", "smooth": "*", "spines": "*", "surface": "*"},
     "tca_mj.robots": {"tetrapod": "add_rail attach_legs dress route_spine_tca trunk"},
     "tca_mj.record": {
-        "layout": "*", "plots": "event_rows", "reader": "*", "render": "Closing", "shapes": "*",
+        "layout": "*", "plots": "event_rows save_figure", "reader": "*", "render": "Closing",
+        "shapes": "*",
     },
     "tca_mj.certify": {"": "*"},
     "tca_mj.validation": {"": "*"},
@@ -48,7 +49,10 @@ INTERNAL = {
         "options": "variation_of", "rewards": "*", "stance": "*", "table": "numbers",
         "task": "broken_off how_it_ended parts together",
     },
-    "tca_mj.agents": {"evaluate": "endings report", "output": "*", "workers": "*"},
+    "tca_mj.agents": {
+        "evaluate": "endings report", "finished": "begun keep", "output": "*", "progress": "*",
+        "workers": "*",
+    },
     "tca_mj.agents.policies": {"archives": "*", "load": "require_untold", "onnx": "*"},
     "tca_mj.agents.scripts": {
         # one for each task, found by the task's ``scripted``
@@ -56,7 +60,8 @@ INTERNAL = {
         "reach": "scripted", "tetrapod": "scripted",
     },
     "tca_mj.agents.train": {
-        "deep": "Run", "export": "*", "gait_score": "*", "learning_env": "*", "runs": "*",
+        "deep": "Run film record", "export": "*", "gait_score": "*", "learning_env": "*",
+        "runs": "*", "sb3_env": "silence",
     },
 }  # fmt: skip
 # Packages that are an arrangement of files: what they have for users, the package above offers.

@@ -4,6 +4,7 @@ The state is one file that is replaced in one go; what else lies in the folder f
 only explains it. So a run that is killed goes on from its last state when it is called again.
 """
 
+import hashlib
 import json
 import pickle
 from dataclasses import asdict
@@ -11,27 +12,21 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from tqdm import tqdm
 
-from tca_mj.agents.output import write_json
+from tca_mj.agents.output import read_json, write_json
 from tca_mj.agents.policies import Origin
 from tca_mj.files import write_whole
 from tca_mj.machine import machine, versions
 
 RUN, STATE, CURVE, TENSORBOARD = "run.json", "state.pkl", "curve.csv", "tensorboard"
+_DIGEST = hashlib.sha256  # of the state, which it ends with
+_REMOVE = "remove it to begin the run anew, or take another folder"
 LIBRARIES = ("torch", "stable-baselines3", "cmaes")
 
 
 def drawn(seed: int, stream: int, count: int) -> list[int]:
     """Seeds of episodes: those of a stream of a run are always the same."""
     return np.random.default_rng((seed, stream)).integers(2**31, size=count).tolist()
-
-
-def progress_bar(steps: int, done: int, progress: bool) -> Any:
-    """A bar that counts steps, where there is a terminal and ``progress`` is wanted."""
-    return tqdm(
-        total=steps, initial=done, unit="step", unit_scale=True, disable=None if progress else True
-    )
 
 
 class RunFolder:
@@ -51,13 +46,17 @@ class RunFolder:
             command: Command that starts the run.
 
         Raises:
-            ValueError: If the folder holds a run with other settings.
+            ValueError: If the folder holds a run with other settings, or files that are broken.
         """
         self.path, self.seed, self.command = path, config.seed, command
         settings = json.loads(json.dumps(asdict(config)))
         file = path / RUN
+        if not file.is_file() and (path / STATE).exists():
+            raise ValueError(f"{path} holds {STATE} without {RUN}: {_REMOVE}")
         if file.is_file():
-            held = json.loads(file.read_text(encoding="utf-8"))["config"]
+            held = read_json(file).get("config")
+            if not isinstance(held, dict):
+                raise ValueError(f"{file} must have a config: it is broken, or another file")
             other = [
                 f"{name} {held.get(name)!r}, not {settings.get(name)!r}"
                 for name in sorted(held.keys() | settings.keys())
@@ -76,16 +75,33 @@ class RunFolder:
         )  # fmt: skip
 
     def load(self) -> Any:
-        """The last state, or None. It is a pickle: only load runs that you trust."""
+        """The last state, or None. It is a pickle: only load runs that you trust.
+
+        Raises:
+            ValueError: If it is not whole, or of another version.
+        """
         file = self.path / STATE
-        return pickle.loads(file.read_bytes()) if file.is_file() else None
+        if not file.is_file():
+            return None
+        content = memoryview(file.read_bytes())
+        state, digest = content[: -_DIGEST().digest_size], content[-_DIGEST().digest_size :]
+        if _DIGEST(state).digest() != digest:
+            raise ValueError(f"{file} is broken, or of an older version: {_REMOVE}")
+        try:
+            return pickle.loads(state)
+        except Exception as error:
+            raise ValueError(f"{file} is of another version ({error!r}): {_REMOVE}") from error
 
     def save(self, state: Any) -> None:
         """Replaces the state by what ``load`` is to give back."""
-        write_whole(self.path / STATE, pickle.dumps(state, protocol=pickle.HIGHEST_PROTOCOL))
+        content = pickle.dumps(state, protocol=pickle.HIGHEST_PROTOCOL)
+        write_whole(self.path / STATE, content + _DIGEST(content).digest())
 
     def tensorboard(self, step: int) -> Any:
-        """A writer for TensorBoard that hides what an interrupted run wrote from ``step`` on."""
+        """A writer for TensorBoard that hides what an interrupted run wrote from ``step`` on.
+
+        What the state knows of ``step`` itself is to be written again.
+        """
         from torch.utils.tensorboard import SummaryWriter
 
         return SummaryWriter(str(self.path / TENSORBOARD), purge_step=step)

@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike
 
 from tca_mj.checks import Array, floats
 from tca_mj.files import write_whole
+from tca_mj.machine import how_to_install
 
 COLDEST = 25.0  # lower end of the colour map: room temperature [°C]
 # Upper end of the colour map and limit in the plot [°C]: the lower annealing temperature [Sun,
@@ -136,7 +137,7 @@ def rollout_plot(
         from matplotlib.figure import Figure
         from matplotlib.lines import Line2D
     except ImportError as error:
-        raise ImportError("the plot needs Matplotlib: pip install 'tca-mj[demo]'") from error
+        raise ImportError(f"the plot needs Matplotlib: {how_to_install('demo')}") from error
 
     clock = floats("time", time)
     panels = [
@@ -230,6 +231,11 @@ def rollout_plot(
                       frameon=False, handlelength=1.6, borderaxespad=0.0)  # fmt: skip
     if title:
         figure.text(left, 0.967, title, fontsize=13, color="#202124", va="center")
-    drawn = io.BytesIO()
-    figure.savefig(drawn, format=Path(path).suffix[1:] or "png")
-    write_whole(Path(path), drawn.getvalue())
+    save_figure(figure, Path(path))
+
+
+def save_figure(figure: Any, path: Path, **more: Any) -> None:
+    """Writes a figure of Matplotlib's in one go; its format is the ending of the path."""
+    memory = io.BytesIO()
+    figure.savefig(memory, format=path.suffix[1:] or "png", **more)
+    write_whole(path, memory.getvalue())

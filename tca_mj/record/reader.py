@@ -1,6 +1,7 @@
 """Recordings read back: curves as arrays with their times and units, and as a table."""
 
 import csv
+import io
 from collections import defaultdict
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -10,6 +11,7 @@ import numpy as np
 from rerun.chunk import RrdReader
 
 from tca_mj.checks import Array
+from tca_mj.files import write_whole
 
 UNITS = {
     "power": "W", "temperature": "°C", "body_temperature": "°C", "tension": "N", "length": "m",
@@ -100,8 +102,9 @@ def write_csv(recording: Recording, path: str | Path) -> None:
     table = np.full((len(times), len(heads)), np.nan)
     for column, curve in enumerate(recording.curves.values()):
         table[np.searchsorted(times, curve.time), column] = curve.values
-    with Path(path).open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file)
-        writer.writerow(["time [s]", *heads])
-        for time, row in zip(times.tolist(), table.tolist(), strict=True):
-            writer.writerow([repr(time), *("" if x != x else repr(x) for x in row)])
+    text = io.StringIO(newline="")
+    writer = csv.writer(text)
+    writer.writerow(["time [s]", *heads])
+    for time, row in zip(times.tolist(), table.tolist(), strict=True):
+        writer.writerow([repr(time), *("" if x != x else repr(x) for x in row)])
+    write_whole(Path(path), text.getvalue().encode())

@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tca_mj.record.plots import temperature_colour
+from tca_mj.machine import how_to_install
+from tca_mj.record.plots import save_figure, temperature_colour
 from tca_mj.tca import CATALOGUE, Load, hanging_length, softening, untwist
 from tca_mj.validation import drag, lifting, sensors, strokes, theories
 from tca_mj.validation.creeping import experiment, four_lengths
@@ -301,7 +302,7 @@ def control_figure(figure: Any) -> None:
 def need_matplotlib() -> None:
     """Raises ImportError with what to do about it if Matplotlib is not installed."""
     if find_spec("matplotlib") is None:
-        raise ImportError("the figures need Matplotlib: pip install 'tca-mj[demo]'")
+        raise ImportError(f"the figures need Matplotlib: {how_to_install('demo')}")
 
 
 def draw(path: Path, width: float, height: float, fill: Callable[[Any], None]) -> None:
@@ -330,4 +331,4 @@ def draw(path: Path, width: float, height: float, fill: Callable[[Any], None]) -
             axis.grid(color="#e6e6e6")
             axis.set_axisbelow(True)
             axis.spines["right"].set_visible(False)
-    figure.savefig(path, dpi=110)
+    save_figure(figure, path, dpi=110)
