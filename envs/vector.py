@@ -14,7 +14,7 @@ from copy import deepcopy
 from typing import Any
 
 import numpy as np
-from gymnasium.error import ResetNeeded
+from gymnasium.error import ClosedEnvironmentError, ResetNeeded
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
@@ -97,8 +97,11 @@ class TaskVector(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[Any
 
     @property
     def batch(self) -> SimulationBatch:
-        """What steps the simulations; its threads start when it is first asked for."""
-        if self._batch is None:
+        """What steps the simulations; its threads start when it is first asked for.
+
+        A process that was forked off starts its own.
+        """
+        if self._batch is None or self._batch.elsewhere:
             sims = [env.sim for env in self.envs]
             self._batch = SimulationBatch(sims, threads=self.num_threads)
         return self._batch
@@ -106,7 +109,12 @@ class TaskVector(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[Any
     def restart(
         self, i: int, *, seed: int | None = None, options: Options = None
     ) -> tuple[Observation, dict[str, Any]]:
-        """Begins a new episode of task ``i``, and touches no other; errors as its ``reset``."""
+        """Begins a new episode of task ``i``, and touches no other; errors as its ``reset``.
+
+        Raises:
+            ClosedEnvironmentError: If the environment is closed.
+        """
+        self._must_be_open()
         given = self.reset_options if options is None else options
         begun = self.envs[i].reset(seed=seed, options=None if given is None else dict(given))
         self._elapsed[i], self._over[i] = 0, False
@@ -127,7 +135,9 @@ class TaskVector(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[Any
         Raises:
             ValueError: If the actions have the wrong shape, are not finite or out of [-1, 1].
             ResetNeeded: If one of the tasks has not been reset.
+            ClosedEnvironmentError: If the environment is closed.
         """
+        self._must_be_open()
         commands = numbers("actions", actions, self.action_space.shape or ())
         if np.abs(commands).max() > 1.0 + 1e-6:
             raise ValueError(f"actions must be within -1 and 1, got {commands}")
@@ -262,7 +272,8 @@ class TaskVector(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[Any
         return values
 
     def render(self) -> tuple[Any, ...]:
-        """The picture of each task, as its ``render``."""
+        """The picture of each task, as its ``render``; errors as ``advance``."""
+        self._must_be_open()
         return tuple(env.render() for env in self.envs)
 
     def call(self, name: str, *args: Any, **kwargs: Any) -> tuple[Any, ...]:
@@ -295,6 +306,10 @@ class TaskVector(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[Any
     def np_random_seed(self) -> Any:
         """The seed of each task's generator."""
         return self.get_attr("np_random_seed")
+
+    def _must_be_open(self) -> None:
+        if self.closed:
+            raise ClosedEnvironmentError(f"{self.num_envs} tasks were closed; make them anew")
 
     def close_extras(self, **kwargs: Any) -> None:
         """Closes the tasks and ends the threads."""

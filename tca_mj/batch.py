@@ -24,6 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tca_mj.couple import Inputs, advance, measure, write
+from tca_mj.forks import Held, keep_for_ever
 from tca_mj.model.smooth import SmoothBody, Strained
 from tca_mj.model.spines import Spines
 from tca_mj.sim import DIVERGENCE, Drive, Simulation, SimulationDiverged
@@ -37,8 +38,8 @@ _POSITIONS = int(mujoco.mjtStage.mjSTAGE_POS)
 _NOTHING = int(mujoco.mjtStage.mjSTAGE_NONE)
 
 
-class SimulationBatch:
-    """n simulations built alike, stepped together.
+class SimulationBatch(Held):
+    """n simulations built alike, stepped together, in the process that has made it.
 
     Attributes:
         sims: The simulations.
@@ -53,6 +54,7 @@ class SimulationBatch:
             ValueError: If there is none, they differ, one is there twice, or ``threads`` is
                 below 1.
         """
+        super().__init__()
         self.sims = tuple(sims)
         if not self.sims:
             raise ValueError("sims is empty; a batch needs at least 1 simulation")
@@ -92,7 +94,13 @@ class SimulationBatch:
 
         Raises:
             ValueError: As ``Simulation.step``; then none of them has moved.
+            RuntimeError: In a process that was forked off: the threads are not there.
         """
+        if self.elsewhere:
+            raise RuntimeError(
+                "a batch must be stepped by the process that made it, not by one forked off it,"
+                " where its threads are not; make one there"
+            )
         if len(drives) != len(self.sims):
             raise ValueError(f"drives must be {len(self.sims)}, got {len(drives)}")
         updates = self.sims[0].updates(duration)
@@ -119,6 +127,10 @@ class SimulationBatch:
             except SimulationDiverged as error:
                 errors[i] = error
         return errors
+
+    def __del__(self) -> None:
+        if self.elsewhere and hasattr(self, "physics"):
+            keep_for_ever(self.physics)  # it would wait for its threads
 
     def _bank_of(self, sims: Sequence[Simulation]) -> Any:
         """The TCAs of simulations as one bank; made anew only if a heat or a supply is another."""

@@ -26,6 +26,7 @@ LAYER_OF = {
     "__init__": "door",
     "registry": "door",
     "files": "door",
+    "forks": "door",
     "checks": "door",
     "quadrature": "door",
     "machine": "door",

@@ -13,6 +13,7 @@ import mujoco
 
 from tca_mj.checks import require_count, require_positive
 from tca_mj.files import Claim
+from tca_mj.machine import how_to_install
 from tca_mj.record.render import Closing, Offscreen, Watched, colour_tendons
 
 
@@ -118,5 +119,5 @@ def _imageio() -> Any:
         return importlib.import_module("imageio.v2")
     except (ImportError, RuntimeError) as error:
         raise ImportError(
-            f"films need imageio and imageio-ffmpeg: pip install 'tca-mj[demo]' ({error})"
+            f"films need imageio and imageio-ffmpeg: {how_to_install('demo')} ({error})"
         ) from error

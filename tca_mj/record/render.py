@@ -17,6 +17,7 @@ import importlib
 import os
 import subprocess
 import sys
+import threading
 import weakref
 from typing import Any, Protocol, Self
 
@@ -25,6 +26,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tca_mj.checks import require_count
+from tca_mj.forks import Held, keep_for_ever
 from tca_mj.record.plots import temperature_colour
 
 _PROBE = """
@@ -158,8 +160,12 @@ def colour_tendons(model: mujoco.MjModel, tendon: ArrayLike, temperature: ArrayL
     model.tendon_rgba[np.asarray(tendon, dtype=np.int64), :3] = temperature_colour(temperature)
 
 
-class Offscreen(Closing):
-    """A camera and the memory it draws into; a context manager."""
+class Offscreen(Closing, Held):
+    """A camera and the memory it draws into; a context manager.
+
+    OpenGL ties a drawing to the thread that opened it. Another one, or a process that was forked
+    off, is refused; closed there, the memory is given back when the program ends.
+    """
 
     def __init__(
         self, model: mujoco.MjModel, *, width: int = 960, height: int = 720,
@@ -178,6 +184,8 @@ class Offscreen(Closing):
             RenderingUnavailable: If OpenGL cannot be had.
             ValueError: If the size is not positive or the camera does not exist.
         """
+        Held.__init__(self)
+        self._thread = threading.current_thread()
         require_count(width=width, height=height)
         self.camera = _camera(model, camera)
         self.model = model
@@ -211,10 +219,15 @@ class Offscreen(Closing):
         """Picture of ``data``, shape (height, width, 3).
 
         Raises:
-            RuntimeError: If it is closed.
+            RuntimeError: If it is closed, or was opened by another thread or process.
         """
         if self._drawing is None:
             raise RuntimeError("the camera is closed")
+        if self._foreign:
+            raise RuntimeError(
+                "a camera must draw in the process and thread that opened it"
+                f" ({self._thread.name}): render there, or make an environment or camera for each"
+            )
         self._gl.make_current()
         mujoco.mjv_updateScene(
             self.model, data, self._option, None, self.camera,
@@ -227,6 +240,9 @@ class Offscreen(Closing):
 
     def close(self) -> None:
         """Gives the memory back; it may be called again."""
+        if self._foreign:
+            keep_for_ever(self._drawing, self._gl)
+            self._drawing = self._gl = None
         if self._drawing is not None:
             self._gl.make_current()
             self._drawing.free()
@@ -235,6 +251,10 @@ class Offscreen(Closing):
             self._gl.free()
             self._gl = None
             atexit.unregister(getattr(self, "_at_exit", _close))
+
+    @property
+    def _foreign(self) -> bool:
+        return self.elsewhere or self._thread is not threading.current_thread()
 
 
 def _close(reference: weakref.ref[Offscreen]) -> None:
