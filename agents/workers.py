@@ -1,20 +1,27 @@
 """Processes that run episodes, on whose number nothing depends."""
 
 import multiprocessing
+import os
 import signal
 import threading
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from multiprocessing import resource_tracker
 from multiprocessing.connection import wait
 from multiprocessing.process import BaseProcess
 from typing import Any, TypeVar
 
 Found = TypeVar("Found")
 
+_STOPPING = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP")
+             if hasattr(signal, name)]  # fmt: skip
+
 
 class Workers:
     """Calls functions in processes of their own, or in this one if there is only one.
 
-    They end with the process that has started them, however that ends.
+    They end with the process that has started them, however and whenever that ends. Ctrl-C, and
+    signals to the whole group of processes, are for that one alone.
     """
 
     def __init__(self, count: int) -> None:
@@ -23,27 +30,28 @@ class Workers:
         self._pipes: list[Any] = []
 
     def __enter__(self) -> "Workers":
-        # Spawned: nothing of this process, of its threads above all, is carried over. Ctrl-C is
-        # for this process alone; one that is started while it is ignored never hears of it.
+        # Spawned: nothing of this process, of its threads above all, is carried over.
         context = multiprocessing.get_context("spawn")
-        alone = threading.current_thread() is threading.main_thread()
-        before = signal.signal(signal.SIGINT, signal.SIG_IGN) if self._count and alone else None
         try:
             for _ in range(self._count):
                 ours, theirs = context.Pipe()
                 process = context.Process(target=_work, args=(theirs,), daemon=True)
-                process.start()
+                with _deaf():
+                    process.start()
+                    self._processes.append(process)
                 theirs.close()
                 self._pipes.append(ours)
-                self._processes.append(process)
-        finally:
-            if before is not None:
-                signal.signal(signal.SIGINT, before)
+        except BaseException:
+            self.__exit__()
+            raise
         return self
 
     def __exit__(self, *error: object) -> None:
-        for pipe, process in zip(self._pipes, self._processes, strict=True):
+        for process in self._processes:
             process.kill()  # it has nothing to lose
+        for process in self._processes:
+            process.join()
+        for pipe in self._pipes:
             pipe.close()
 
     def run(
@@ -56,7 +64,7 @@ class Workers:
             jobs: Its arguments, call by call.
 
         Raises:
-            RuntimeError: If a process has ended.
+            ChildProcessError: If a process has ended.
         """
         if not self._count:
             yield from ((i, function(*job)) for i, job in enumerate(jobs))
@@ -71,7 +79,9 @@ class Workers:
                 ready: list[Any] = wait(list(busy))
                 answers = [(pipe, pipe.recv()) for pipe in ready]
             except (EOFError, OSError) as error:
-                raise RuntimeError("a process that ran episodes has ended") from error
+                raise ChildProcessError(
+                    "a process that ran episodes has ended: was there too little memory?"
+                ) from error
             for pipe, answer in answers:
                 if isinstance(answer, Exception):
                     raise answer
@@ -79,8 +89,23 @@ class Workers:
                 yield busy.pop(pipe), answer
 
 
+@contextmanager
+def _deaf() -> Iterator[None]:
+    """Lets the process that is started hear no signal to stop; this one hears it afterwards."""
+    if not hasattr(signal, "pthread_sigmask"):  # Windows
+        yield
+        return
+    resource_tracker.ensure_running()  # starting that would lift the mask
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, _STOPPING)
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
 def _work(pipe: Any) -> None:
     """A process that does what it is told until the other end of its pipe is gone."""
+    threading.Thread(target=_end_with_parent, daemon=True).start()
     try:
         while True:
             function, job = pipe.recv()
@@ -91,3 +116,10 @@ def _work(pipe: Any) -> None:
             pipe.send(answer)
     except (EOFError, OSError):
         return
+
+
+def _end_with_parent() -> None:
+    parent = multiprocessing.parent_process()
+    assert parent is not None
+    wait([parent.sentinel])
+    os._exit(1)

@@ -261,7 +261,7 @@ def test_an_error_in_a_process_arrives_and_so_does_its_end():
             list(workers.run(run_trial, [(brief(randomise=0.9),)]))
         for process in workers._processes:
             process.kill()
-        with pytest.raises(RuntimeError, match="a process that ran episodes has ended"):
+        with pytest.raises(ChildProcessError, match="a process that ran episodes has ended"):
             list(workers.run(run_trial, [(brief(),), (brief(),)]))
 
 

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from concurrent.futures import ProcessPoolExecutor
-from contextlib import nullcontext
 from dataclasses import dataclass
 from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from tca_mj.agents.workers import Workers
 from tca_mj.certify.cases import Case, Gap, as_run, at_rest, bent, draw, gap, theory
 from tca_mj.certify.rest import Rest
 from tca_mj.certify.subjects import SUBJECTS, Subject
@@ -165,13 +164,13 @@ def outcomes(
     """
     tasks = [(name, number) for number in range(effort.cases) for name in names]
     answer = partial(_one, effort=effort, seed=seed)
-    result: dict[str, list[Outcome]] = {name: [] for name in names}
-    with ProcessPoolExecutor(workers) if workers > 1 else nullcontext() as pool:
-        answers = (map if pool is None else pool.map)(answer, tasks)
-        for (name, _), outcome in zip(tasks, answers, strict=True):
-            result[name].append(outcome)
+    found: dict[int, Outcome] = {}
+    with Workers(workers) as processes:
+        for number, outcome in processes.run(answer, [(task,) for task in tasks]):
+            found[number] = outcome
             progress()
-    return result
+    each = [(name, found[number]) for number, (name, _) in enumerate(tasks)]
+    return {name: [outcome for of, outcome in each if of == name] for name in names}
 
 
 def _one(task: tuple[str, int], effort: Effort, seed: int) -> Outcome:

@@ -10,9 +10,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from tqdm import tqdm
 
 from tca_mj import pages
+from tca_mj.agents.progress import progress_bar
 from tca_mj.certify.cases import Gap
 from tca_mj.certify.claims import Claim, claims
 from tca_mj.certify.outcomes import FULL, POSITION, ROTATION, TIMES, Effort, Outcome, outcomes
@@ -61,7 +61,7 @@ def certify(
     asked = [name for name in SUBJECTS if name in names] if names else list(SUBJECTS)
     cores = int(machine()["cores"]) if workers is None else workers
     begin, busy = time.perf_counter(), time.process_time()
-    with tqdm(total=effort.cases * len(asked), disable=None, unit="case", leave=False) as bar:
+    with progress_bar(effort.cases * len(asked), unit="cases", leave=False) as bar:
         rows = outcomes(asked, effort=effort, seed=seed, workers=cores, progress=bar.update)
     single = [] if names else claims()
     processor = time.process_time() - busy

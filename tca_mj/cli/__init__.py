@@ -1,15 +1,19 @@
 """The command ``tca-mj``. What its subcommands need is loaded when one of them runs."""
 
 import argparse
+import os
+import signal
 import sys
 from collections import Counter
 from collections.abc import Sequence
+from contextlib import suppress
 from typing import Any
 
 import tca_mj
 from tca_mj.cli import check, learn, play
 from tca_mj.cli.arguments import ALGORITHMS, POLICIES, filled
 from tca_mj.cli.play import outcome, speed_table
+from tca_mj.cli.signals import Signals
 
 __all__ = ["ALGORITHMS", "POLICIES", "main", "outcome", "speed_table"]
 
@@ -30,24 +34,45 @@ examples:
 def main(argv: Sequence[str] | None = None) -> int:
     """Runs the command line and returns its exit code.
 
+    SIGTERM and SIGHUP end a command as Ctrl-C does: what it has is kept. A second one, while that
+    is written, cuts this short.
+
     Args:
-        argv: Arguments without the name of the program; None for those of the process.
+        argv: Arguments without the name of the program; None for those of the process, which is
+            to end then.
 
     Raises:
         SystemExit: With code 2 if the arguments are wrong, 0 after ``--help`` or ``--version``.
     """
-    arguments = _parser().parse_args(argv)
+    arguments = argparse.Namespace(command="", kept=[], needs=lambda: "")
+    with Signals() as signals:
+        try:
+            arguments = _parser().parse_args(argv, arguments)
+            _check_rendering()
+            return _run(arguments)
+        except KeyboardInterrupt:
+            signals.over(leaving=argv is None)
+            heard = signals.heard
+            said = "interrupted" if heard is signal.SIGINT else f"ended by {heard.name}"
+            print("; ".join([said, *arguments.kept]), file=sys.stderr)
+            exec("")  # CPython would die of SIGINT if that had struck inside another exec
+            return 128 + heard
+        except BrokenPipeError:  # who reads has seen enough, as head
+            with suppress(OSError):
+                os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+            return 128 + 13
+        except (ImportError, OSError, ValueError) as error:
+            hint = arguments.needs() if isinstance(error, ImportError) else ""
+            print(f"tca-mj {arguments.command}: {_said(error)}{hint}", file=sys.stderr)
+            return 2
+
+
+def _run(arguments: argparse.Namespace) -> int:
     before = _warnings()
     try:
         return arguments.run(arguments)
-    except KeyboardInterrupt:
-        print("; ".join(["interrupted", *arguments.kept]), file=sys.stderr)
-        return 130
-    except (ConnectionError, FileNotFoundError, ImportError, ValueError) as error:
-        hint = arguments.needs if isinstance(error, ImportError) else ""
-        print(f"tca-mj {arguments.command}: {error}{hint}", file=sys.stderr)
-        return 2
     finally:
+        sys.stdout.flush()
         warned = _warnings() - before
         if warned:
             from tca_mj.model.mujoco_warnings import warning_line
@@ -59,6 +84,31 @@ def _warnings() -> Counter[str]:
     """How often MuJoCo has warned of what; nothing if nothing has loaded it."""
     counting: Any = sys.modules.get("tca_mj.model.mujoco_warnings")
     return Counter() if counting is None else counting.warning_counts()
+
+
+def _check_rendering() -> None:
+    """Refuses a ``MUJOCO_GL`` with which MuJoCo cannot even be imported; nothing where it is unset.
+
+    Raises:
+        ValueError: With the reason.
+    """
+    wanted = os.environ.get("MUJOCO_GL")
+    if not wanted:
+        return
+    try:
+        import mujoco  # noqa: F401
+    except Exception as error:
+        raise ValueError(
+            "MUJOCO_GL must name a way to OpenGL that is installed here (egl, osmesa, glfw), or be"
+            f" 'disable', or not be set, got {wanted!r}: {error}"
+        ) from error
+
+
+def _said(error: Exception) -> str:
+    """What an error says."""
+    if isinstance(error, OSError) and error.strerror:
+        return f"{error.filename}: {error.strerror}" if error.filename else error.strerror
+    return str(error)
 
 
 def _parser() -> argparse.ArgumentParser:

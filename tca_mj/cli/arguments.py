@@ -42,9 +42,14 @@ def add_command(
         name, help=help, description=filled(cleandoc(run.__doc__ or "")),
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    needs = f"; pip install 'tca-mj[{extra}]'" if extra else ""
-    parser.set_defaults(run=run, command=name, kept=[], needs=needs)
+    parser.set_defaults(run=run, command=name, kept=[], needs=partial(_needed, extra))
     return parser
+
+
+def _needed(extra: str) -> str:
+    from tca_mj.machine import how_to_install
+
+    return f"; {how_to_install(extra)}" if extra else ""
 
 
 def add(parser: argparse._ActionsContainer, name: str, help: str, **more: Any) -> None:
@@ -153,7 +158,10 @@ def parse_axis(text: str) -> tuple[str, tuple[Any, ...]]:
 def parse_folder(text: str) -> Path:
     """A folder that one may write into, there or to be made."""
     path = Path(text)
-    there = next((p for p in (path, *path.absolute().parents) if p.exists()), path)
+    try:
+        there = next((p for p in (path, *path.absolute().parents) if p.exists()), path)
+    except OSError as error:
+        raise argparse.ArgumentTypeError(f"must be a folder: {error.strerror}") from error
     if not there.is_dir():
         raise argparse.ArgumentTypeError(f"must be a folder, {there} is a file")
     if not os.access(there, os.W_OK):

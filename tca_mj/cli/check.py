@@ -68,7 +68,7 @@ def _validate(arguments: argparse.Namespace) -> int:
     Writes into the folder --out:
       report.json          the same as data
       report.md            the same as text
-      validation_*.png     figures (needs `pip install 'tca-mj[demo]'`)
+      validation_*.png     figures (needs the extra demo)
 
     A fact that is missed is no failure of the command: its exit code is 0.
     """
@@ -88,7 +88,7 @@ def _certify(arguments: argparse.Namespace) -> int:
     Writes into the folder --out:
       report.json          the same as data, case by case
       report.md            the same as text
-      accuracy_*.png       figures (needs `pip install 'tca-mj[demo]'`)
+      accuracy_*.png       figures (needs the extra demo)
 
     An error beyond 1 % of the length or 2 degrees is no failure of the command: its exit code is 0.
     """

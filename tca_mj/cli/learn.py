@@ -1,6 +1,7 @@
 """Policies: ``eval`` measures one, ``train`` makes one, ``sweep`` does so at many settings."""
 
 import argparse
+import shlex
 import sys
 from pathlib import Path
 from typing import Any
@@ -46,7 +47,7 @@ def add_commands(commands: Commands) -> None:
     add(train, "--workers", "processes of cma; default 2", default=2)
     add(train, "--envs", "environments of ppo, sac, td3 at a time")
     add(train, "--residual", "correct a gait by at most K kelvin", type=float, metavar="K")
-    add(train, "--video", "film the best network at the end",
+    add(train, "--video", "film the best network at the end; --no-video leaves that for later",
         action=argparse.BooleanOptionalAction, default=True)  # fmt: skip
     add(train, "--start", "gait to begin with or to correct: scripted (default), trot, a policy's"
         " file or name", default="scripted", metavar="GAIT")  # fmt: skip
@@ -123,7 +124,7 @@ def _train(arguments: argparse.Namespace) -> int:
       last.json, last.npz   the policy where the run stands
       evaluations.csv, best.rrd, best.mp4   evaluations of a network and an episode of the best
 
-    Needs `pip install 'tca-mj[rl]'`. Exit code: 0 when the run is done, 2 if the command was wrong,
+    Needs the extra rl. Exit code: 0 when the run is done, 2 if the command was wrong,
     130 after Ctrl-C.
 
     examples:
@@ -150,15 +151,19 @@ def _train(arguments: argparse.Namespace) -> int:
             searching.search(config, out, workers=arguments.workers, command=command)
         else:
             settings = default_config(arguments.task, arguments.algo, **given)
-            training.train(settings, out, command=command, video=arguments.video)
+            training.train(settings, out, command=command, video=False)
+            if arguments.video:
+                arguments.kept[:] = [f"{out} is finished but for its film, which the same command"
+                                     f" makes, or tca-mj demo --policy {shlex.quote(str(out))}"
+                                     f" --task {arguments.task}"]  # fmt: skip
+                print("filming the best policy; Ctrl-C leaves that for later", file=sys.stderr)
+                training.film(settings, out)
         print(f"  {out / ('best.json' if cma else 'best.npz')}")
     return 0
 
 
 def _command(arguments: argparse.Namespace) -> str:
     """The command of a training run, to be noted."""
-    import shlex
-
     words = ["tca-mj", "train", arguments.task, "--algo", arguments.algo]
     for option in ("steps", "envs", "residual", "start", "seeds", "seed"):
         value = getattr(arguments, option)
@@ -175,7 +180,7 @@ def _sweep(arguments: argparse.Namespace) -> int:
       trials/       the folder of each, in which it goes on where it stopped
 
     A trial whose process or machine is lost is begun again and goes on; so does the whole sweep
-    with the same command. Needs `pip install 'tca-mj[sweep]'`.
+    with the same command. Needs the extra sweep.
 
     --set NAME=VALUE,VALUE,... with NAME
       seed, policy, randomise, episodes, steps, model, timestep    of `tca-mj eval`
@@ -205,6 +210,7 @@ def _sweep(arguments: argparse.Namespace) -> int:
         task=arguments.task, policy=arguments.policy or "off", episodes=arguments.episodes,
         **how,
     )  # fmt: skip
+    arguments.kept.append(f"the same command goes on with {arguments.out}")
     sweep = Sweep(evaluation=evaluation, axes=dict(arguments.axes), algorithm=arguments.algo)
     try:
         run_sweep(sweep, arguments.out, workers=arguments.workers, address=arguments.address)

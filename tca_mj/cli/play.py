@@ -75,8 +75,8 @@ def _demo(arguments: argparse.Namespace) -> int:
     writes into the folder --out:
       summary.json   success, energy, peak temperatures, duration, versions, machine
       rollout.rrd    everything over time; open it with `rerun rollout.rrd`
-      rollout.mp4    a film (needs OpenGL and `pip install 'tca-mj[demo]'`)
-      rollout.png    power, temperature, tension, bend (needs `pip install 'tca-mj[demo]'`)
+      rollout.mp4    a film (needs OpenGL and the extra demo)
+      rollout.png    power, temperature, tension, bend (needs the extra demo)
 
     Exit code: 0 if the episode is a success (a gait: it came to the end of its time), 1 if not, 2
     if the command was wrong, 130 after Ctrl-C, which keeps what was recorded until then.
