@@ -21,6 +21,7 @@ from tqdm import tqdm
 
 from tca_mj.agents.output import plain, write_json
 from tca_mj.agents.policies import Policy
+from tca_mj.agents.progress import progress_bar
 from tca_mj.agents.rollout import Step, rollout
 from tca_mj.envs.task import Headway
 from tca_mj.envs.wrappers import RecordRerun
@@ -89,7 +90,7 @@ class Episode:
         Args:
             limit: Simulated time after which to stop [s].
             speed: Simulated seconds per second of film.
-            progress: Whether to show a progress bar, where there is a terminal.
+            progress: Whether to show how far it is.
 
         Returns:
             The summary, see ``tca_mj.agents.demo.play``.
@@ -105,7 +106,7 @@ class Episode:
                     ends.callback(self._plot, self.out / PLOT)
             ends.callback(self.env.close)
             ends.callback(self._end_film)
-            bar = tqdm(total=limit, bar_format=_BAR, disable=None if progress else True)
+            bar = progress_bar(limit, unit="s", progress=progress, terminal=_BAR)
             ends.callback(bar.close)
             try:
                 if VIDEO in self.files and self.out is not None:
@@ -114,6 +115,7 @@ class Episode:
                 while not self.ending:
                     self._go_on()
                     bar.set_description_str(self.policy.phase, refresh=False)
+                    bar.set_postfix({"return": f"{self.total:.2f}"}, refresh=False)
                     bar.update(self.clock[-1] - bar.n)
                     if not self.ending and self.clock[-1] > limit - 1e-6:
                         self.ending = f"stopped after {limit:g} s"

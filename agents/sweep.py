@@ -12,21 +12,32 @@ import hashlib
 import itertools
 import json
 import os
-from collections.abc import Mapping, Sequence
+import secrets
+import shutil
+import signal
+import sys
+import tempfile
+import threading
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
 from tca_mj.agents.evaluate import METRICS, Evaluation, cell, evaluate, label
-from tca_mj.agents.output import write_csv, write_json
+from tca_mj.agents.output import read_json, write_csv, write_json
+from tca_mj.agents.progress import progress_bar
 from tca_mj.checks import number, require_count
-from tca_mj.files import write_whole
+from tca_mj.files import claimed, write_whole
 from tca_mj.machine import machine, versions
 from tca_mj.pages import table
 
 TRIALS, RESULT = "trials", "result.json"
 TABLE, PAGE, ABOUT = "results.csv", "results.md", "sweep.json"
 ALGORITHMS = ("cma", "ppo", "sac", "td3")
+
+# What Ray is told: not to report its use, to leave Ctrl-C to us.
+_RAY = {"RAY_USAGE_STATS_ENABLED": "0", "TUNE_DISABLE_SIGINT_HANDLER": "1"}
 
 Value = float | int | str
 
@@ -167,8 +178,11 @@ def run_sweep(
 
     Raises:
         ImportError: If Ray is not installed.
+        FileNotFoundError: If there is no such policy.
         ConnectionError: If there is no cluster at ``address``.
         RuntimeError: If trials ended in an error; what the others found is written.
+        BlockingIOError: If another process works in ``out``.
+        OSError: If something cannot be written.
         ValueError: If ``workers`` or ``failures`` is out of range.
     """
     require_count(workers=workers)
@@ -176,13 +190,18 @@ def run_sweep(
     out = out.absolute()
     trials = sweep.trials()
     files = [out / TRIALS / trial.name / RESULT for trial in trials]
-    missing = [trial for trial, file in zip(trials, files, strict=True) if not file.is_file()]
-    about = {"axes": {k: list(v) for k, v in sweep.axes.items()}, "versions": versions("ray"),
-             "machine": machine(), "command": repr(sweep)}  # fmt: skip
-    write_json(out / ABOUT, about, indent=1)
-    errors = _tune(missing, out, workers, address, failures) if missing else {}
-    found = [json.loads(file.read_text(encoding="utf-8")) for file in files if file.is_file()]
-    _write(sweep, found, out)
+    with claimed(out):
+        held = [_result(file) if file.is_file() else None for file in files]
+        missing = [trial for trial, result in zip(trials, held, strict=True) if result is None]
+        for trial in missing:
+            if sweep.algorithm is None:
+                trial.evaluation(out).key()  # reads the policy: one that is not there says so now
+        about = {"axes": {k: list(v) for k, v in sweep.axes.items()}, "versions": versions("ray"),
+                 "machine": machine(), "command": repr(sweep)}  # fmt: skip
+        write_json(out / ABOUT, about, indent=1)
+        errors = _tune(missing, out, workers, address, failures) if missing else {}
+        found = [_result(file) for file in files if file.is_file()]
+        _write(sweep, found, out)
     if errors:
         raise RuntimeError(f"{len(errors)} trials ended in an error: {errors}")
     return found
@@ -192,43 +211,120 @@ def _tune(
     trials: Sequence[Trial], out: Path, workers: int, address: str | None, failures: int
 ) -> dict[str, str]:
     """Lets Ray Tune run the trials; returns what went wrong, by the trial's point."""
-    os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")  # Ray would report its use otherwise
-    import ray
-    from ray import tune
+    with ExitStack() as ends:
+        ends.enter_context(_environment(_RAY if address else _RAY | _own_cluster()))
+        import ray
+        from ray import tune
 
-    def trainable(config: dict[str, Any]) -> None:
-        trial = trials[config["number"]]
-        result = trial.run(out / TRIALS / trial.name)
-        tune.report({name: row["mean"] for name, row in result["figures"].items()})
+        class Progress(tune.Callback):
+            bar = ends.enter_context(progress_bar(len(trials), unit="trials"))
 
-    begun = not ray.is_initialized()
-    if begun:
-        local: dict[str, Any] = {"num_cpus": workers, "include_dashboard": False}
+            def on_trial_complete(self, *_: Any, **__: Any) -> None:
+                self.bar.update()
+
+            def on_trial_error(self, *_: Any, **__: Any) -> None:
+                self.bar.update()
+
+        start = Path.cwd()
+
+        def trainable(config: dict[str, Any]) -> None:
+            with suppress(OSError):  # of another machine, which needs no relative paths then
+                os.chdir(start)
+            trial = trials[config["number"]]
+            result = trial.run(out / TRIALS / trial.name)
+            tune.report({name: row["mean"] for name, row in result["figures"].items()})
+
         variables = {"OMP_NUM_THREADS": "1", "PYTHONPATH": os.environ.get("PYTHONPATH", "")}
-        ray.init(
-            address=address or "local", log_to_driver=False,
-            runtime_env={"env_vars": variables}, **({} if address else local),
-        )  # fmt: skip
-    try:
+        if not ray.is_initialized():
+            where: dict[str, Any] = {"address": address}
+            if address is None:
+                folder = ends.enter_context(_temporary(out))
+                where = {"address": "local", "num_cpus": workers, "include_dashboard": False,
+                         "_temp_dir": str(folder)}  # fmt: skip
+            ends.callback(ray.shutdown)
+            with _own_sigterm():
+                ray.init(**where, log_to_driver=False, runtime_env={"env_vars": variables})
         tuner = tune.Tuner(
             tune.with_resources(trainable, {"cpu": 1}),
             param_space={"number": tune.grid_search(list(range(len(trials))))},
             tune_config=tune.TuneConfig(max_concurrent_trials=workers, reuse_actors=True),
             run_config=tune.RunConfig(
-                name="ray", storage_path=str(out), verbose=0,
+                name="ray", storage_path=str(out), verbose=0, callbacks=[Progress()],
                 failure_config=tune.FailureConfig(max_failures=failures),
             ),
         )  # fmt: skip
         results = tuner.fit()
         ended = [results[i] for i in range(len(results))]
         return {
-            json.dumps(dict(trials[result.config["number"]].point)): str(result.error)
+            json.dumps(dict(trials[result.config["number"]].point)): _last_line(result.error)
             for result in ended
             if result.error is not None and result.config
         }
+
+
+def _result(file: Path) -> dict[str, Any]:
+    """What a trial has found.
+
+    Raises:
+        ValueError: If the file is broken.
+    """
+    found = read_json(file)
+    if not all(isinstance(found.get(name), dict) for name in ("point", "figures")):
+        raise ValueError(f"{file} must have point and figures; remove it to run the trial again")
+    return found
+
+
+def _last_line(error: Exception) -> str:
+    """What an error says, without the way that it has come."""
+    return str(error).strip().splitlines()[-1]
+
+
+def _own_cluster() -> dict[str, str]:
+    """What Ray is told of a cluster that nobody else is to reach: by the machine's own address
+    alone, and with a token that is nowhere but in its processes.
+    """
+    return {"RAY_ENABLE_WINDOWS_OR_OSX_CLUSTER": "0", "RAY_AUTH_TOKEN": secrets.token_hex(32)}
+
+
+@contextmanager
+def _own_sigterm() -> Iterator[None]:
+    """Leaves SIGTERM to whom it belonged before; Ray would take it."""
+    before = signal.getsignal(signal.SIGTERM)
+    try:
+        yield
     finally:
-        if begun:
-            ray.shutdown()
+        if threading.current_thread() is threading.main_thread():
+            signal.signal(signal.SIGTERM, before)
+
+
+@contextmanager
+def _environment(variables: Mapping[str, str]) -> Iterator[None]:
+    """Environment variables for a while, where they are not set."""
+    new = {name: value for name, value in variables.items() if name not in os.environ}
+    os.environ.update(new)
+    try:
+        yield
+    finally:
+        for name in new:
+            os.environ.pop(name, None)
+
+
+@contextmanager
+def _temporary(out: Path) -> Iterator[Path]:
+    """A folder for what Ray keeps while it runs, its sockets above all, whose paths must be short.
+
+    What a sweep into the same folder that was killed has left of it is removed first.
+    """
+    mark = f"tca-mj-{hashlib.sha256(str(out).encode()).hexdigest()[:6]}-"
+    usual = "/tmp" if sys.platform == "darwin" else tempfile.gettempdir()
+    where = Path(os.environ.get("RAY_TMPDIR", usual))
+    for old in where.glob(f"{mark}*"):
+        shutil.rmtree(old, ignore_errors=True)
+    folder = Path(tempfile.mkdtemp(prefix=mark, dir=where))
+    try:
+        yield folder
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
 
 
 def _write(sweep: Sweep, found: Sequence[dict[str, Any]], out: Path) -> None:

@@ -64,7 +64,7 @@ def quiet(monkeypatch):
         flush = close = lambda self: None
 
     monkeypatch.setattr(RunFolder, "tensorboard", lambda self, step: Board())
-    monkeypatch.setattr(Run, "record", lambda self, video: None)
+    monkeypatch.setattr("tca_mj.agents.train.deep.record", lambda *_, **__: None)
 
 
 @pytest.mark.usefixtures("quiet")
@@ -154,7 +154,7 @@ def test_a_run_that_is_killed_goes_on(tmp_path):
     train(config, out, progress=False, video=False)
     train(config, tmp_path / "whole", progress=False, video=False)
     assert written(out) == written(tmp_path / "whole")
-    assert (out / "best.rrd").is_file() and not list(out.glob("part*"))
+    assert (out / "best.rrd").is_file() and not list(out.glob(".*"))
     assert list((out / "tensorboard").iterdir())
 
 
@@ -250,15 +250,19 @@ def test_the_command_makes_the_settings(monkeypatch, tmp_path):
     asked = []
     monkeypatch.setattr(
         "tca_mj.agents.train.deep.train",
-        lambda config, out, *, command, video: asked.append((config, out, command, video)),
+        lambda config, out, *, command, video: asked.append((config, out, command)),
     )
-    out = ["--out", str(tmp_path), "--no-video"]
+    filmed = []
+    monkeypatch.setattr("tca_mj.agents.train.deep.film", lambda _, out: filmed.append(out.name))
+    out = ["--out", str(tmp_path)]
     arguments = ["train", WALK, "--algo", "ppo", "--residual", "15", "--envs", "3", "--seeds", "2"]
     assert main([*arguments, "--steps", "5000", *out]) == 0
-    (first, folder, command, video), (second, *_) = asked
+    assert filmed == ["seed_0", "seed_1"]
+    assert main([*arguments, "--steps", "5000", *out, "--no-video"]) == 0 and len(filmed) == 2
+    (first, folder, command), (second, *_) = asked[:2]
     assert first == settings.default_config(
         WALK, "ppo", residual=15.0, envs=3, steps=5000, seed=0, start="scripted"
     )
-    assert second.seed == 1 and folder == tmp_path / "seed_0" and not video
+    assert second.seed == 1 and folder == tmp_path / "seed_0"
     assert command.startswith(f"tca-mj train {WALK} --algo ppo")
     assert main(["train", QUICK, "--algo", "sac", "--residual", "15", *out]) == 2

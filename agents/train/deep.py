@@ -23,7 +23,6 @@ import torch
 from stable_baselines3 import PPO, SAC, TD3
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.callbacks import BaseCallback
-from stable_baselines3.common.logger import Logger
 from stable_baselines3.common.noise import NormalActionNoise
 from stable_baselines3.common.vec_env import VecNormalize
 
@@ -31,12 +30,14 @@ from tca_mj.agents.episode import RECORDING, VIDEO, Episode
 from tca_mj.agents.output import write_csv
 from tca_mj.agents.policies import SavedPolicy
 from tca_mj.agents.policies.actors import first_gait
+from tca_mj.agents.progress import progress_bar
 from tca_mj.agents.rollout import earned, rollout
 from tca_mj.agents.train.config import TrainConfig
 from tca_mj.agents.train.export import exported
 from tca_mj.agents.train.learning_env import LearningEnv
-from tca_mj.agents.train.runs import CURVE, RunFolder, drawn, progress_bar
-from tca_mj.agents.train.sb3_env import TaskVecEnv
+from tca_mj.agents.train.runs import CURVE, RunFolder, drawn
+from tca_mj.agents.train.sb3_env import TaskVecEnv, silence
+from tca_mj.files import PART, claimed
 from tca_mj.registry import make
 
 EVALUATIONS = "evaluations.csv"
@@ -53,28 +54,35 @@ def train(
     """Trains a policy, or goes on with the run that ``out`` holds.
 
     Into ``out`` go ``run.json``, ``state.pkl``, ``curve.csv``, ``evaluations.csv``, the policies
-    ``best`` (by the evaluations) and ``last``, ``best.rrd``, ``best.mp4`` and ``tensorboard``.
+    ``best`` (by the evaluations) and ``last``, ``best.rrd`` and ``tensorboard``, and what ``film``
+    writes.
     Torch computes on one thread meanwhile.
 
     Args:
         config: The settings.
         out: Folder of the run.
         command: What to note as the command.
-        video: Whether to film the best policy at the end, where there is OpenGL.
-        progress: Whether to show a progress bar, where there is a terminal.
+        video: Whether to ``film`` the best policy at the end.
+        progress: Whether to show how far it is.
 
     Returns:
         The best policy.
 
     Raises:
         FileNotFoundError, ValueError: If the settings do not fit, or not to the run in ``out``.
+        BlockingIOError: If another process works in ``out``.
+        OSError: If something cannot be written.
         KeyboardInterrupt: As it came; the same call goes on from the last interval.
     """
+    if config.residual:
+        first_gait(config.task, config.start)  # before a file is touched
     with ExitStack() as ends:
+        ends.enter_context(claimed(out))
         ends.callback(torch.set_num_threads, torch.get_num_threads())
         torch.set_num_threads(1)
         run = ends.enter_context(closing(Run(config, RunFolder(out, config, command))))
-        bar = progress_bar(config.steps, run.model.num_timesteps, progress)
+        done = run.model.num_timesteps
+        bar = progress_bar(config.steps, unit="steps", done=done, progress=progress)
         ends.callback(bar.close)
         if not run.new:
             run.explain()  # the state may be newer, if the run was killed in between
@@ -86,9 +94,45 @@ def train(
             run.mark(last=True)
         if run.best is None:
             run.evaluate()
-        run.record(video=video)
+        if run.best is not None and not (out / f"{BEST}.rrd").is_file():
+            record(config, out, run.best[1])
     assert run.best is not None
+    if video:
+        film(config, out)
     return run.best[1]
+
+
+def film(config: TrainConfig, out: Path) -> None:
+    """Films the best policy of a run into ``best.mp4``, where there is OpenGL, unless that is done.
+
+    It may take longer than the training, and may be broken off at no loss.
+
+    Args:
+        config: The settings.
+        out: Folder of the run.
+    """
+    if not (out / f"{BEST}.mp4").is_file():
+        with claimed(out):
+            record(config, out, SavedPolicy.read(out / f"{BEST}.npz"), video=True)
+
+
+def record(config: TrainConfig, out: Path, policy: SavedPolicy, *, video: bool = False) -> None:
+    """Records an episode of a policy as the best; its files are replaced when they are whole."""
+    env: gym.Env[Any, Any] = make(config.task, **config.arguments)
+    part = out / f".{BEST}{PART}"
+    try:
+        episode = Episode(
+            env, policy.make(env), names=(config.task, BEST), seed=config.seed, out=part,
+            options=config.options, files=(RECORDING, VIDEO) if video else (RECORDING,),
+        )  # fmt: skip
+        limited = np.isfinite(episode.limit)
+        speed = max(1.0, episode.limit / _FILM) if limited else episode.task.film_speed
+        files = episode.run(episode.limit, speed=speed, progress=video)["files"]
+        (out / f"{BEST}.mp4").unlink(missing_ok=True)  # it would show another policy
+        for name in files:
+            os.replace(part / name, out / name.replace("rollout", BEST))
+    finally:
+        shutil.rmtree(part, ignore_errors=True)
 
 
 class Run:
@@ -129,9 +173,12 @@ class Run:
             if state["replay"] is not None:
                 self.model.replay_buffer = pickle.loads(state["replay"])  # type: ignore[attr-defined]
             _set_generators(self.model, state["generators"])
-        self.model.set_logger(Logger(folder=None, output_formats=[]))
+        silence(self.model)
         self.test_env: gym.Env[Any, Any] = make(config.task, **config.arguments)
         self.board = folder.tensorboard(self.model.num_timesteps)
+        for kind, known_rows in (("training", self.rows), ("evaluation", self.evaluations)):
+            if known_rows and known_rows[-1]["steps"] == self.model.num_timesteps:
+                self._show(kind, known_rows[-1])
         self.marks = self.model.num_timesteps // config.interval
 
     def mark(self, *, last: bool = False) -> None:
@@ -161,7 +208,7 @@ class Run:
         self._show("evaluation", row)
         if self.best is None or row["return"] > self.best[0]:
             self.best = row["return"], saved
-            self.record(video=False)
+            record(config, self.folder.path, saved)
 
     def policy(self) -> SavedPolicy:
         """The policy as it is now."""
@@ -202,23 +249,6 @@ class Run:
         if self.best is not None:
             self.best[1].save(self.folder.path / f"{BEST}.npz")
         self.board.flush()
-
-    def record(self, *, video: bool) -> None:
-        """Records an episode of the best policy; its files are replaced when they are whole."""
-        if self.best is None:
-            return
-        folder, config = self.folder.path, self.config
-        env: gym.Env[Any, Any] = make(config.task, **config.arguments)
-        episode = Episode(
-            env, self.best[1].make(env), names=(config.task, BEST), seed=config.seed,
-            out=folder / "part", options=config.options,
-            files=(RECORDING, VIDEO) if video else (RECORDING,),
-        )  # fmt: skip
-        limited = np.isfinite(episode.limit)
-        speed = max(1.0, episode.limit / _FILM) if limited else episode.task.film_speed
-        for name in episode.run(episode.limit, speed=speed, progress=False)["files"]:
-            os.replace(folder / "part" / name, folder / name.replace("rollout", BEST))
-        shutil.rmtree(folder / "part")
 
     def close(self) -> None:
         """Ends what the run has opened."""

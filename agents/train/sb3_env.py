@@ -8,12 +8,19 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
+from stable_baselines3.common.base_class import BaseAlgorithm
+from stable_baselines3.common.logger import Logger
 from stable_baselines3.common.vec_env import VecEnv
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices, VecEnvStepReturn
 
 from tca_mj.envs.task import SimulatedTask
 from tca_mj.envs.vector import TaskVector
 from tca_mj.registry import episode_steps, find_task, task_class
+
+
+def silence(model: BaseAlgorithm) -> None:
+    """Gives a learner a logger that writes nowhere; its own makes a folder for temporary files."""
+    model.set_logger(Logger(folder=None, output_formats=[]))
 
 
 class TaskVecEnv(VecEnv):

@@ -9,10 +9,11 @@ from __future__ import annotations
 
 import pickle
 from collections.abc import Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 from cmaes import CMA
@@ -21,12 +22,14 @@ from numpy.typing import NDArray
 from tca_mj.agents.output import write_csv
 from tca_mj.agents.policies import SavedPolicy
 from tca_mj.agents.policies.actors import TROT, first_gait
+from tca_mj.agents.progress import progress_bar
 from tca_mj.agents.train.gait_score import Headway, Reference, Trial, run_trial, score
 from tca_mj.agents.train.gait_space import GaitSpace
-from tca_mj.agents.train.runs import CURVE, RunFolder, drawn, progress_bar
+from tca_mj.agents.train.runs import CURVE, RunFolder, drawn
 from tca_mj.agents.workers import Workers
 from tca_mj.checks import Checked, Count, number, require_count
 from tca_mj.control import Gait
+from tca_mj.files import claimed
 from tca_mj.registry import task_class
 
 BEST, LAST = "best.json", "last.json"
@@ -113,46 +116,45 @@ def search(
         out: Folder of the run.
         workers: Processes that run episodes; no result depends on it.
         command: What to note as the command.
-        progress: Whether to show a progress bar, where there is a terminal.
+        progress: Whether to show how far it is.
 
     Returns:
         The best gait.
 
     Raises:
         FileNotFoundError, ValueError: If the settings do not fit, or not to the run in ``out``.
+        BlockingIOError: If another process works in ``out``.
+        OSError: If something cannot be written.
         KeyboardInterrupt: As it came, after everything was written.
     """
     require_count(workers=workers)
     gait, steering = first_gait(config.task, config.start)
     space = GaitSpace(centre=gait, hottest=task_class(config.task).hot_temperature)
     point = space.encode(gait, steering)
-    folder = RunFolder(out, config, command)
     optimiser = CMA(
         mean=point, sigma=config.sigma, population_size=config.population, seed=config.seed
     )
-    state, known = folder.load() or (SearchState(optimiser=optimiser), {})
-    run = _Search(config, folder, space, point, state, known)
-    board = folder.tensorboard(state.steps)
-    bar = progress_bar(config.steps, state.steps, progress)
-    try:
-        with Workers(workers) as processes:
-            run.processes = processes
-            run.prepare()
-            while run.state.steps < config.steps:
-                run.generation()
-                if run.state.generation % config.validate_every == 0:
-                    run.validate()
-                run.save()
-                for name, value in run.state.rows[-1].items():
-                    board.add_scalar(f"search/{name}", value, run.state.steps)
-                board.flush()
-                bar.update(run.state.steps - bar.n)
-                bar.set_postfix(run.shown())
-            run.validate()
-    finally:
-        run.save()
-        bar.close()
-        board.close()
+    with ExitStack() as ends:
+        ends.enter_context(claimed(out))
+        folder = RunFolder(out, config, command)
+        state, known = folder.load() or (SearchState(optimiser=optimiser), {})
+        board = folder.tensorboard(state.steps)
+        ends.callback(board.close)
+        bar = progress_bar(config.steps, unit="steps", done=state.steps, progress=progress)
+        ends.callback(bar.close)
+        run = _Search(config, folder, space, point, state, known, board)
+        ends.callback(run.save)
+        run.processes = ends.enter_context(Workers(workers))
+        run.prepare()
+        while run.state.steps < config.steps:
+            run.generation()
+            if run.state.generation % config.validate_every == 0:
+                run.validate()
+            run.save()
+            run.show()
+            bar.set_postfix(run.shown(), refresh=False)
+            bar.update(run.state.steps - bar.n)
+        run.validate()
     return run.policy(best=True)
 
 
@@ -164,6 +166,7 @@ class _Search:
         first: Its first point.
         state: Where it stands, replaced as a whole.
         known: Episodes that are finished of a step of the search that is not.
+        board: TensorBoard's.
         processes: Who runs episodes.
     """
 
@@ -173,6 +176,7 @@ class _Search:
     first: NDArray[np.float64]
     state: SearchState
     known: dict[tuple[str, int], Headway]
+    board: Any
     processes: Workers = field(init=False)
 
     def __post_init__(self) -> None:
@@ -189,6 +193,7 @@ class _Search:
             self.save()
         if self.state.generation and self.state.generation % self.config.validate_every == 0:
             self.validate()
+        self.show()
 
     def generation(self) -> None:
         """Draws gaits, runs their episodes and moves the distribution."""
@@ -266,6 +271,12 @@ class _Search:
 
     def _validation(self) -> list[int]:
         return drawn(self.config.seed, 0, self.config.validation_episodes)
+
+    def show(self) -> None:
+        """Shows the last row in TensorBoard, at the steps that the state stands at."""
+        for name, value in self.state.rows[-1].items() if self.state.rows else ():
+            self.board.add_scalar(f"search/{name}", value, self.state.steps)
+        self.board.flush()
 
     def shown(self) -> dict[str, str]:
         """What the progress bar says."""

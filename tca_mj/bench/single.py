@@ -16,10 +16,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from tqdm import tqdm
 
 from tca_mj.agents.policies import Policy
 from tca_mj.agents.policies.actors import arguments_of, scripted
+from tca_mj.agents.progress import progress_bar
 from tca_mj.bench.clock import Replay, Timed, in_physics, median, stopwatch, taken
 from tca_mj.checks import Array, number
 from tca_mj.envs.wrappers import RecordRerun
@@ -68,7 +68,7 @@ def benchmark(
     policy = scripted(env)
     steps, repetitions = max(int(400 * scale), 4), max(int(100 * scale), 2)
     tca = _tca(scale)
-    with tqdm(total=3 * repetitions + 2 * steps, disable=None, unit="step", leave=False) as bar:
+    with progress_bar(3 * repetitions + 2 * steps, unit="steps", leave=False) as bar:
         result = {
             "machine": machine(), "versions": versions(), "task": id, "tca": tca,
             "model": {

@@ -23,8 +23,8 @@ from typing import Any
 
 import gymnasium as gym
 import numpy as np
-from tqdm import tqdm
 
+from tca_mj.agents.progress import progress_bar
 from tca_mj.bench.clock import Replay, in_physics, stopwatch
 from tca_mj.checks import number
 from tca_mj.envs.task import SimulatedTask
@@ -71,9 +71,11 @@ def benchmark(
     }  # fmt: skip
     chosen = list(ids) or [task.id for task in TASKS]
     trained = next((id for id in chosen if task_class(id).learning_steps), chosen[0])
-    for id in tqdm([*chosen, _PEER], disable=None, unit="task", leave=False):
-        with _if_installed(id, result):
-            result["tasks"][id] = _task(id, n, steps, repetitions)
+    with progress_bar(len(chosen) + 1, unit="tasks", leave=False) as bar:
+        for id in [*chosen, _PEER]:
+            with _if_installed(id, result):
+                result["tasks"][id] = _task(id, n, steps, repetitions)
+            bar.update()
     with _if_installed("training", result):
         result["training"] = _training(trained, max(int(1024 * scale), 64), min(n, 8))
     result["load"].append(os.getloadavg()[0])
@@ -202,7 +204,7 @@ def _training(id: str, frames: int, n: int) -> dict[str, float]:
     from stable_baselines3 import PPO
     from stable_baselines3.common.vec_env import DummyVecEnv, VecEnv
 
-    from tca_mj.agents.train.sb3_env import TaskVecEnv
+    from tca_mj.agents.train.sb3_env import TaskVecEnv, silence
 
     def one_by_one(id: str) -> VecEnv:
         return DummyVecEnv([lambda: gym.make(id)] * n)
@@ -222,6 +224,7 @@ def _training(id: str, frames: int, n: int) -> dict[str, float]:
             learner = PPO(
                 "MlpPolicy", envs, n_steps=rollout, batch_size=rollout * n, seed=0, device="cpu"
             )
+            silence(learner)
             start = time.perf_counter()
             learner.learn(2 * rollout * n)
             rates[name] = 2 * rollout * n / (time.perf_counter() - start)

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from tca_mj import pages
+from tca_mj.agents.progress import progress_bar
 from tca_mj.machine import machine, versions
 from tca_mj.validation import (
     creeping,
@@ -78,8 +79,12 @@ _FIGURES: dict[str, tuple[float, float, Callable[[Any], None], str]] = {
 
 def all_findings() -> dict[str, list[Finding]]:
     """Every finding, by chapter of the report."""
-    return {name: [row for find in finders for row in find()]
-            for name, (finders, _) in _CHAPTERS.items()}  # fmt: skip
+    found = {}
+    with progress_bar(len(_CHAPTERS), unit="chapters", leave=False) as bar:
+        for name, (finders, _) in _CHAPTERS.items():
+            found[name] = [row for find in finders for row in find()]
+            bar.update()
+    return found
 
 
 def all_tables() -> dict[str, str]:
