@@ -9,7 +9,7 @@ or are held.
 
 Faults, which must not be: an exception; a number in an observation, a reward or an info that is
 none; an observation outside its space; an episode that diverged; and, where actions are
-temperatures, one that overheated.
+temperatures, a TCA above ``max_temperature``.
 """
 
 from __future__ import annotations
@@ -176,6 +176,8 @@ def _make(id: str, way: str) -> Any:
 def _take(env: Any, way: dict[str, Any], random: Random, turn: int, examples: list[str]) -> None:
     """One turn, whose findings are added to what is known of its way."""
     endings, wrong = Counter(way["endings"]), Counter(way["faults"])
+    task = getattr(env, "envs", [env.unwrapped])[0]
+    limit = np.inf if task.heating == "power" else task.max_temperature
     steps = 0
 
     def note(fault: str, more: str = "") -> None:
@@ -187,15 +189,17 @@ def _take(env: Any, way: dict[str, Any], random: Random, turn: int, examples: li
     try:
         for seen in (_single if way["way"] == "single" else _vector)(env, random, turn):
             steps += 1
-            kind = (seen.ending or "").partition(":")[0]
+            kind, hottest = (seen.ending or "").partition(":")[0], np.max(seen.info["temperature"])
             for fault in _wrong(seen, env):
                 note(fault)
             if seen.ending is not None:
                 endings[kind] += 1
                 way["episodes"] += 1
-            if kind == "diverged" or (kind == "overheated" and not way["way"].endswith("power")):
+            if kind == "diverged":
                 note(kind, f", {seen.ending}")
-            way["hottest"] = max(way["hottest"], float(np.max(seen.info["temperature"])))
+            if hottest > limit:
+                note("TCA too hot", f", {hottest:.1f} °C")
+            way["hottest"] = max(way["hottest"], float(hottest))
     except Exception as error:
         note(type(error).__name__, f", {error}")
     way["steps"] += max(steps, 1)  # a way that fails at once does not go on for ever
