@@ -1,41 +1,77 @@
-"""Numbers from outside: real, finite and within their bounds, or a refusal that says what is wrong.
+"""The door: what comes from outside is what its type says, or it is refused by name and bound.
 
+``Checked`` checks the fields of a dataclass and ``checked`` the arguments of a function, both by
+their types; what a type cannot say is checked by ``within`` and its like where it is needed.
 Every message reads ``name must ..., got ...``.
 """
 
+import inspect
 import math
-from collections.abc import Callable
+import reprlib
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields
-from functools import cache, partial
-from typing import Annotated, Any, Literal, get_args, get_origin, get_type_hints
+from functools import cache, partial, wraps
+from types import NoneType, UnionType
+from typing import (
+    Annotated,
+    Any,
+    Literal,
+    ParamSpec,
+    TypeVar,
+    Union,
+    get_args,
+    get_origin,
+    get_type_hints,
+)
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+Check = Callable[[str, Any], Any]
+"""From a name and a value to the value, as it goes on; it raises ValueError."""
+
+P = ParamSpec("P")
+R = TypeVar("R")
+
+_SHORT = reprlib.Repr()
+_SHORT.maxother, _SHORT.maxstring, _SHORT.maxlist, _SHORT.maxtuple = 160, 80, 8, 8
 
 
-def floats(name: str, values: ArrayLike) -> Array:
+def shown(value: Any) -> str:
+    """A value as a message shows it: never longer than a few lines."""
+    try:
+        return _SHORT.repr(value)
+    except ValueError:  # Python does not write whole numbers of thousands of digits
+        return f"a whole number of {value.bit_length()} bits"
+
+
+def floats(name: str, values: ArrayLike, *, empty: bool = False) -> Array:
     """``values`` as an array of floats, without a copy if they are one.
 
     Args:
         name: What they are, for the message.
         values: A real number or an array of them; NaN and infinity pass.
+        empty: Whether a list without a number passes, too, as an empty array always does.
 
     Raises:
-        ValueError: If they are complex, text, ragged or no numbers at all, which NumPy would
-            partly convert with a warning or none.
+        ValueError: If they are complex, text, dates, masked, true or false, ragged or no numbers at
+            all, which NumPy would partly convert with a warning or none.
     """
     if type(values) is np.ndarray and values.dtype == np.float64:
         return values
     try:
         array = np.asarray(values)
-        if array.dtype.kind not in "biuf":
+        listed = not isinstance(values, np.ndarray)
+        masked = np.ma.isMaskedArray(values)
+        if array.dtype.kind not in "iuf" or masked or (listed and not array.size and not empty):
             raise TypeError
-        return array.astype(np.float64)
+        with np.errstate(over="ignore"):
+            return array.astype(np.float64)
     except (OverflowError, TypeError, ValueError) as error:
         raise ValueError(
-            f"{name} must be a real number or an array of them, got {values!r}"
+            f"{name} must be a real number or an array of them, got {shown(values)}"
         ) from error
 
 
@@ -63,10 +99,10 @@ def within(
     Raises:
         ValueError: If one is no real number, not finite or out of bounds, or the shape another.
     """
-    array = floats(name, values)
+    array = floats(name, values, empty=shape is not None)
     if shape is not None and array.shape != shape:
         kind = f"finite numbers of shape {shape}" if shape else "one finite number"
-        raise ValueError(f"{name} must be {kind}, got {values!r}")
+        raise ValueError(f"{name} must be {kind}, got {shown(values)}")
     if not array.size:
         return array
     least, most = float(array.min()), float(array.max())  # not a number if one is none
@@ -78,12 +114,82 @@ def within(
     bounds = {"above": above, "at least": at_least, "below": below, "at most": at_most}
     said = [f"{word} {bound:.6g}" for word, bound in bounds.items() if math.isfinite(bound)]
     tail = f" {unit}" if unit and said else ""
-    raise ValueError(f"{name} must be {' and '.join(['finite', *said])}{tail}, got {values!r}")
+    must = " and ".join(["finite", *said])
+    raise ValueError(f"{name} must be {must}{tail}, got {shown(values)}")
 
 
 def number(name: str, value: Any, **bounds: Any) -> float:
     """One number within bounds, which are those of ``within``; errors as there."""
     return float(within(name, value, shape=(), **bounds))
+
+
+def numbers(name: str, values: Any, **bounds: Any) -> float | Array:
+    """A number or an array of them within bounds, as it comes; errors as ``within``."""
+    array = within(name, values, **bounds)
+    return array if array.ndim else float(array)
+
+
+def limits(name: str, values: Any, *, above: float = -math.inf) -> float | Array:
+    """Upper limits, one or an array of them; infinity is none.
+
+    Raises:
+        ValueError: If one is no real number or not above the bound.
+    """
+    array = floats(name, values)
+    if not (array > above).all():
+        bound = f"above {above:.6g}" if above > -math.inf else "numbers or infinity"
+        raise ValueError(f"{name} must be {bound}, got {shown(values)}")
+    return array if array.ndim else float(array)
+
+
+def row(name: str, values: Any, **bounds: Any) -> tuple[float, ...]:
+    """Numbers in a row within bounds, which are those of ``within``; errors as there."""
+    if isinstance(values, str | Mapping) or np.ndim(array := within(name, values, **bounds)) != 1:
+        raise ValueError(f"{name} must be a row of finite numbers, got {shown(values)}")
+    return tuple(array.tolist())
+
+
+def whole(name: str, value: Any, *, at_least: int | None = None, at_most: int | None = None) -> int:
+    """A whole number within bounds.
+
+    Raises:
+        ValueError: If it is none or out of bounds; 2.0 is none.
+    """
+    if not isinstance(value, int | np.integer) or isinstance(value, bool):
+        raise ValueError(f"{name} must be a whole number, got {shown(value)}")
+    low = at_least is not None and value < at_least
+    if low or (at_most is not None and value > at_most):
+        said = f"at least {at_least}" if low else f"at most {at_most}"
+        raise ValueError(f"{name} must be {said}, got {shown(value)}")
+    return int(value)
+
+
+def flag(name: str, value: Any) -> bool:
+    """True or False; ValueError if it is neither, as 1 and "yes" are."""
+    if not isinstance(value, bool | np.bool_):
+        raise ValueError(f"{name} must be True or False, got {shown(value)}")
+    return bool(value)
+
+
+def flags(name: str, values: ArrayLike) -> Flags:
+    """Trues and falses as an array; 1 and 0 will do.
+
+    Raises:
+        ValueError: If one of them is neither.
+    """
+    array = np.asarray(values)
+    if array.dtype != np.bool_ or np.ma.isMaskedArray(values):
+        array = floats(name, values)
+        if not ((array == 0.0) | (array == 1.0)).all():
+            raise ValueError(f"{name} must be True or False, got {shown(values)}")
+    return array.astype(np.bool_)
+
+
+def text(name: str, value: Any) -> str:
+    """A text; ValueError if it is none."""
+    if not isinstance(value, str):
+        raise ValueError(f"{name} must be a text, got {shown(value)}")
+    return value
 
 
 def require_positive(**values: Any) -> None:
@@ -103,52 +209,218 @@ def require_count(**values: Any) -> None:
         ValueError: If one of them is no whole number or below 1.
     """
     for name, value in values.items():
-        whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
-        if not whole:
-            raise ValueError(f"{name} must be a whole number, got {value!r}")
-        if value < 1:
-            raise ValueError(f"{name} must be at least 1, got {value!r}")
+        whole(name, value, at_least=1)
 
 
-def require_one_of(name: str, value: Any, choices: tuple[Any, ...]) -> None:
-    """Raises ValueError unless ``value`` is one of the choices."""
-    if value not in choices:
-        raise ValueError(f"{name} must be one of {choices}, got {value!r}")
+def require_one_of(name: str, value: Any, choices: Sequence[Any]) -> Any:
+    """Returns ``value``; raises ValueError unless it is one of the choices, in kind, too."""
+    if not any(isinstance(value, type(choice)) and value == choice for choice in choices):
+        raise ValueError(f"{name} must be one of {tuple(choices)}, got {shown(value)}")
+    return value
 
 
-# Types of fields, which ``Checked`` checks. The plurals are numbers or arrays of them.
+# Types of fields and of arguments. The plurals are numbers or arrays of them.
 Finite = Annotated[float, number]
 Positive = Annotated[float, partial(number, above=0.0)]
 NotNegative = Annotated[float, partial(number, at_least=0.0)]
+Share = Annotated[float, partial(number, at_least=0.0, at_most=1.0)]
 Temperature = Annotated[float, partial(number, above=-273.15)]
-Count = Annotated[int, lambda name, value: require_count(**{name: value})]
-Triple = Annotated[tuple[float, float, float], partial(within, shape=(3,))]
-Positives = Annotated[float | Array, partial(within, above=0.0)]
-NotNegatives = Annotated[float | Array, partial(within, at_least=0.0)]
+Count = Annotated[int, partial(whole, at_least=1)]
+Seed = Annotated[int, partial(whole, at_least=0)]
+Triple = Annotated[tuple[float, float, float], partial(row, shape=(3,))]
+Positives = Annotated[float | Array, partial(numbers, above=0.0)]
+NotNegatives = Annotated[float | Array, partial(numbers, at_least=0.0)]
+Limits = Annotated[float | Array, partial(limits, above=0.0)]
+Numbers = Annotated[ArrayLike, within]
 
 
 class Checked:
     """A dataclass that checks itself: each field by what its type says.
 
-    That is ``Literal[...]`` or ``Annotated[..., check]``; a check takes name and value and raises
-    ValueError. What ties fields together is checked in a
-    ``__post_init__`` that calls this one first.
+    A number is finite, a count whole, a specification one of its kind; ``Annotated[..., check]``
+    says more. What passes is kept in one form: a number as a float, a row as a tuple. What ties
+    fields together is checked in a ``__post_init__`` that calls this one first.
+
+    Raises:
+        ValueError: If a field is not what its type says.
     """
 
     __slots__ = ()
 
     def __post_init__(self) -> None:
         kind: Any = type(self)
-        for name, check in _checks(kind):
-            check(name, getattr(self, name))
+        for name, check in _fields(kind):
+            given = getattr(self, name)
+            kept = check(name, given)
+            if kept is not given:
+                object.__setattr__(self, name, kept)
+
+
+def checked(function: Callable[P, R]) -> Callable[P, R]:
+    """A function whose arguments are checked by their types, as fields of ``Checked`` are.
+
+    It costs some microseconds a call: what runs in a loop checks what it needs by itself.
+    """
+
+    @wraps(function)
+    def door(*args: P.args, **kwargs: P.kwargs) -> R:
+        signature, checks = _arguments(function)
+        bound = signature.bind(*args, **kwargs)
+        given = bound.arguments
+        for name, check in checks:
+            if name in given:
+                given[name] = check(name, given[name])
+        return function(*bound.args, **bound.kwargs)
+
+    return door
 
 
 @cache
-def _checks(kind: Any) -> tuple[tuple[str, Callable[[str, Any], Any]], ...]:
-    types = get_type_hints(kind, include_extras=True)  # which a file may keep as text
-    own = {field.name: types[field.name] for field in fields(kind)}
-    choices = {name: get_args(type) for name, type in own.items() if get_origin(type) is Literal}
-    return (
-        *((name, partial(require_one_of, choices=each)) for name, each in choices.items()),
-        *((name, check) for name in own for check in getattr(own[name], "__metadata__", ())),
-    )
+def _fields(kind: Any) -> tuple[tuple[str, Check], ...]:
+    hints = get_type_hints(kind, include_extras=True)
+    found = ((field.name, by_type(hints[field.name])) for field in fields(kind))
+    return tuple((name, check) for name, check in found if check is not None)
+
+
+@cache
+def _arguments(function: Any) -> tuple[inspect.Signature, tuple[tuple[str, Check], ...]]:
+    signature = inspect.signature(function)
+    hints = get_type_hints(function, include_extras=True)
+    single = (inspect.Parameter.POSITIONAL_OR_KEYWORD, inspect.Parameter.KEYWORD_ONLY)
+    named = [p.name for p in signature.parameters.values() if p.kind in single and p.name in hints]
+    found = ((name, by_type(hints[name])) for name in named)
+    return signature, tuple((name, check) for name, check in found if check is not None)
+
+
+def by_type(hint: Any) -> Check | None:
+    """What checks a value of a type; None for a type that says nothing, as ``Any``."""
+    origin, inner = get_origin(hint), get_args(hint)
+    if origin is Annotated:
+        own = [check for check in hint.__metadata__ if callable(check)]
+        return partial(_in_turn, checks=own) if own else by_type(inner[0])
+    if hint in _PLAIN:
+        return _PLAIN[hint]
+    if origin is Literal:
+        return partial(require_one_of, choices=inner)
+    if origin in (Union, UnionType):
+        return _union(inner)
+    if origin is tuple:
+        return _tuple(inner)
+    if origin is Sequence or origin is list:
+        return partial(_sequence, each=by_type(inner[0]))
+    if origin is Mapping or origin is dict:
+        return partial(_mapping, key=by_type(inner[0]), each=by_type(inner[1]))
+    if origin is Callable:
+        return _callable
+    if _is_kind(hint):
+        return partial(_instance, kinds=(hint,), words=_word(hint))
+    return None
+
+
+def _is_kind(hint: Any) -> bool:
+    """Whether ``isinstance`` knows a type, and not everything is one."""
+    if not inspect.isclass(hint) or get_origin(hint):
+        return False
+    return hint not in (Any, object) and not getattr(hint, "_is_protocol", False)
+
+
+_PLAIN: dict[Any, Check] = {float: number, int: whole, bool: flag, str: text}
+_WORDS = {float: "a number", int: "a whole number", bool: "True or False", str: "a text",
+          NoneType: "None"}  # fmt: skip
+
+
+def _word(hint: Any) -> str:
+    if hint in _WORDS:
+        return _WORDS[hint]
+    if get_origin(hint) is Annotated:
+        return _word(get_args(hint)[0])
+    if get_origin(hint) is Literal:
+        return f"one of {get_args(hint)}"
+    name: str = getattr(get_origin(hint) or hint, "__name__", str(hint))
+    return f"{'an' if name[:1] in 'AEIOU' else 'a'} {name}"
+
+
+def _in_turn(name: str, value: Any, checks: Sequence[Check]) -> Any:
+    """What a check returns goes on to the next; what returns nothing has let the value pass."""
+    for check in checks:
+        kept = check(name, value)
+        value = value if kept is None else kept
+    return value
+
+
+def _union(members: Sequence[Any]) -> Check | None:
+    """None passes if it is a member; a number may be an array, if that is; else any will do."""
+    left = [member for member in members if member is not NoneType]
+    optional = len(left) < len(members)
+    if set(left) == {float, Array}:
+        found: Check | None = numbers
+    elif all(_is_kind(each) and each not in _PLAIN for each in left):
+        words = " or ".join(map(_word, members))
+        return partial(_instance, kinds=tuple(members), words=words)
+    elif len(left) == 1:
+        found = by_type(left[0])
+    else:
+        left.sort(key=lambda each: each is float)  # a whole number stays one
+        checks = [check for each in left if (check := by_type(each)) is not None]
+        if len(checks) < len(left):
+            return None
+        found = partial(_any_of, checks=checks, words=" or ".join(map(_word, members)))
+    return partial(_optional, check=found) if optional and found else found
+
+
+def _optional(name: str, value: Any, check: Check) -> Any:
+    return None if value is None else check(name, value)
+
+
+def _any_of(name: str, value: Any, checks: Sequence[Check], words: str) -> Any:
+    for check in checks:
+        try:
+            return check(name, value)
+        except ValueError:
+            continue
+    raise ValueError(f"{name} must be {words}, got {shown(value)}")
+
+
+def _instance(name: str, value: Any, kinds: tuple[type, ...], words: str) -> Any:
+    if not isinstance(value, kinds):
+        raise ValueError(f"{name} must be {words}, got {shown(value)}")
+    return value
+
+
+def _callable(name: str, value: Any) -> Any:
+    if not callable(value):
+        raise ValueError(f"{name} must be a function, got {shown(value)}")
+    return value
+
+
+def _tuple(inner: Sequence[Any]) -> Check | None:
+    endless = len(inner) == 2 and inner[1] is Ellipsis
+    if set(inner) - {Ellipsis} == {float}:
+        return partial(row, shape=None if endless else (len(inner),))
+    if endless:
+        return partial(_sequence, each=by_type(inner[0]), kind=tuple)
+    return partial(_sequence, each=[by_type(each) for each in inner], kind=tuple)
+
+
+def _sequence(name: str, value: Any, each: Any, kind: type | None = None) -> Any:
+    """A sequence of what ``each`` lets pass, or as many as ``each`` has checks."""
+    array = isinstance(value, np.ndarray) and value.ndim and not np.ma.isMaskedArray(value)
+    if not (array or isinstance(value, Sequence)) or isinstance(value, str | bytes):
+        raise ValueError(f"{name} must be a sequence, got {shown(value)}")
+    checks = each if isinstance(each, list) else [each] * len(value)
+    if len(checks) != len(value):
+        raise ValueError(f"{name} must have {len(checks)} entries, got {shown(value)}")
+    pairs = enumerate(zip(checks, value, strict=True))
+    found = [check(f"{name}[{i}]", item) if check else item for i, (check, item) in pairs]
+    return value if kind is None else kind(found)
+
+
+def _mapping(name: str, value: Any, key: Check | None, each: Check | None) -> Any:
+    if not isinstance(value, Mapping):
+        raise ValueError(f"{name} must be a mapping, got {shown(value)}")
+    for word, item in value.items():
+        if key is not None:
+            key(f"keys of {name}", word)
+        if each is not None:
+            each(f"{name}[{word!r}]", item)
+    return value

@@ -270,7 +270,7 @@ def test_an_error_in_a_process_arrives_and_so_does_its_end():
     [
         ({"task": "TCA/ArmPickPlace-v0"}, "task must have four legs"),
         ({"steps": 0}, "steps must be"),
-        ({"population": 4}, "population must be finite and at least 5"),
+        ({"population": 4}, "population must be at least 5"),
         ({"sigma": 0.0}, "sigma must be finite and above 0"),
         ({"randomise": 0.6}, "randomise must be finite and at least 0 and at most 0.5"),
         ({"window": 26.0}, "window must be finite and at least 0.1 and at most 25 s"),

@@ -27,7 +27,7 @@ from tca_mj.agents.train.gait_score import Headway, Reference, Trial, run_trial,
 from tca_mj.agents.train.gait_space import GaitSpace
 from tca_mj.agents.train.runs import CURVE, RunFolder, drawn
 from tca_mj.agents.workers import Workers
-from tca_mj.checks import Checked, Count, number, require_count
+from tca_mj.checks import Checked, Count, number, require_count, whole
 from tca_mj.control import Gait
 from tca_mj.files import claimed
 from tca_mj.registry import task_class
@@ -67,7 +67,7 @@ class SearchConfig(Checked):
     seed: int = 0
     start: str = "scripted"
     sigma: Annotated[float, partial(number, above=0.0, at_most=0.5)] = 0.03
-    population: Annotated[int, partial(number, at_least=5)] = 14
+    population: Annotated[int, partial(whole, at_least=5)] = 14
     episodes: Count = 1
     randomise: Annotated[float, partial(number, at_least=0.0, at_most=0.5)] = 0.2
     settling: Annotated[float, partial(number, at_least=0.0, at_most=20.0, unit="s")] = 10.0

@@ -10,14 +10,25 @@ the temperature, it heats late cycles no hotter than early ones.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tca_mj.checks import Array, Checked, Positive, floats, within
+from tca_mj.checks import Array, Checked, Positive, shown, within
 
 Row = tuple[float, ...]
-Rows = Row | tuple[Row, ...]
+
+
+def _rows(name: str, rows: Any) -> Any:
+    """A row or several, as tuples."""
+    value = within(name, rows)
+    if value.ndim not in (1, 2) or not value.size:
+        raise ValueError(f"{name} must be rows of finite numbers of one length, got {shown(rows)}")
+    return tuple(value.tolist() if value.ndim == 1 else map(tuple, value.tolist()))
+
+
+Rows = Annotated[Row | tuple[Row, ...], _rows]
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -48,11 +59,9 @@ class Gait(Checked):
 
     def __post_init__(self) -> None:
         Checked.__post_init__(self)
-        if _table("offset", self.offset).ndim != 1:
-            raise ValueError(f"offset must be a row of finite numbers, got {self.offset}")
-        tcas = _table("start", self.start).shape[-1]
+        tcas = np.shape(self.start)[-1]
         for name in ("start", "duty", "hot", "warm"):
-            value = _table(name, getattr(self, name))
+            value = np.array(getattr(self, name))
             if value.shape[-1] != tcas:
                 raise ValueError(f"{name} must have {tcas} numbers per leg, got {value.shape[-1]}")
             if value.ndim == 2 and len(value) != self.legs:
@@ -75,20 +84,12 @@ class Gait(Checked):
         Returns:
             Temperatures of all TCAs, leg by leg, shape (..., legs * TCAs per leg) [°C].
         """
-        phase = floats("phase", phase)[..., None, None]
+        phase = within("phase", phase)[..., None, None]
         into = (phase + np.array(self.offset)[:, None] - np.array(self.start)) % 1.0
-        hot, warm = np.array(self.hot, dtype=np.float64), np.array(self.warm, dtype=np.float64)
-        target = np.where(into < np.array(self.duty), hot, warm)
+        target = np.where(into < np.array(self.duty), np.array(self.hot), np.array(self.warm))
         return target.reshape(*target.shape[:-2], -1)
 
     def table(self, name: str) -> Array:
         """``start``, ``duty``, ``hot`` or ``warm`` of every leg, shape (legs, TCAs per leg)."""
-        row = _table(name, getattr(self, name))
+        row = np.array(getattr(self, name))
         return np.broadcast_to(row, (self.legs, row.shape[-1])).copy()
-
-
-def _table(name: str, rows: Rows) -> Array:
-    value = within(name, rows)
-    if value.ndim not in (1, 2) or not value.size:
-        raise ValueError(f"{name} must be rows of finite numbers of one length, got {rows}")
-    return value

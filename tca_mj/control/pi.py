@@ -18,7 +18,7 @@ from typing import Annotated
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tca_mj.checks import Array, Checked, NotNegatives, require_positive, within
+from tca_mj.checks import Array, Checked, NotNegatives, limits, numbers, require_positive, within
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -38,16 +38,14 @@ class PiSpec(Checked):
 
     proportional: NotNegatives
     integral: NotNegatives = 0.0
-    lowest: Annotated[float | Array, within] = 0.0
-    highest: float | Array = math.inf
+    lowest: Annotated[float | Array, numbers] = 0.0
+    highest: Annotated[float | Array, limits] = math.inf
     near: NotNegatives = 0.0
     near_proportional: NotNegatives = 0.0
-    near_integral: float | Array | None = None
+    near_integral: NotNegatives | None = None
 
     def __post_init__(self) -> None:
         Checked.__post_init__(self)
-        if self.near_integral is not None:
-            within("near_integral", self.near_integral, at_least=0.0)
         if not np.all(np.asarray(self.lowest) < self.highest):
             raise ValueError(f"highest must be above lowest {self.lowest}, got {self.highest}")
 

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from tca_mj.checks import Checked, NotNegative, Positive, Triple, require_positive, within
+from tca_mj.checks import Checked, NotNegative, Positive, Triple, require_positive, row
 from tca_mj.hints import size
 
 
@@ -76,7 +76,7 @@ class BeamSpec(Checked):
     """
 
     length: Annotated[float, partial(size, kind="soft bodies", at_most=10.0)]
-    bending: Annotated[tuple[float, float], partial(within, shape=(2,), above=0.0)]
+    bending: Annotated[tuple[float, float], partial(row, shape=(2,), above=0.0)]
     torsion: Positive
     stretching: Positive
     shearing: Positive

@@ -19,7 +19,7 @@ from typing import Annotated
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tca_mj.checks import Array, Checked, Positives, floats, number, require_positive, within
+from tca_mj.checks import Array, Checked, Positives, floats, number, numbers, require_positive
 from tca_mj.smp.convection import Slab, moving_air, radiation, still_air
 from tca_mj.smp.material import SpineSpec
 from tca_mj.tca import HeatSpec, power_from_voltage
@@ -51,9 +51,9 @@ class HeaterSpec(Checked):
 
     capacity: Positives
     loss: Positives
-    fan_gain: Annotated[float | Array, partial(within, at_least=1.0)]
+    fan_gain: Annotated[float | Array, partial(numbers, at_least=1.0)]
     resistance: Positives
-    ambient: Annotated[float | Array, partial(within, above=-273.15, unit="°C")] = 25.0
+    ambient: Annotated[float | Array, partial(numbers, above=-273.15, unit="°C")] = 25.0
 
     @classmethod
     def fitted(

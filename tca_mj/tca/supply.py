@@ -15,7 +15,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tca_mj.checks import Array, Checked, Positives, within
+from tca_mj.checks import Array, Checked, Limits, Positives, within
 from tca_mj.tca.thermal import HeatSpec, power_from_voltage
 
 Quantity = Literal["power", "voltage", "current", "temperature"]
@@ -86,17 +86,13 @@ class Supply(Checked):
     """
 
     quantity: Quantity = "power"
-    max_power: float | Array = math.inf
-    max_voltage: float | Array = math.inf
-    max_current: float | Array = math.inf
+    max_power: Limits = math.inf
+    max_voltage: Limits = math.inf
+    max_current: Limits = math.inf
     thermostat: Thermostat | None = None
 
     def __post_init__(self) -> None:
         Checked.__post_init__(self)
-        for name in ("max_power", "max_voltage", "max_current"):
-            limit = np.asarray(getattr(self, name), dtype=np.float64)
-            if not (limit > 0.0).all():
-                raise ValueError(f"{name} must be above 0, got {getattr(self, name)!r}")
         if (self.quantity == "temperature") != (self.thermostat is not None):
             raise ValueError(
                 f"thermostat must be given for temperature and nothing else, got {self.thermostat}"

@@ -19,7 +19,17 @@ from typing import Annotated, NamedTuple, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tca_mj.checks import Array, Checked, NotNegatives, Positive, Positives, floats, number, within
+from tca_mj.checks import (
+    Array,
+    Checked,
+    NotNegatives,
+    Positive,
+    Positives,
+    floats,
+    number,
+    numbers,
+    within,
+)
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -41,7 +51,7 @@ class HeatSpec(Checked):
 
     capacity: Positives
     loss: NotNegatives
-    ambient: Annotated[float | Array, partial(within, above=-273.15, unit="°C")] = 25.0
+    ambient: Annotated[float | Array, partial(numbers, above=-273.15, unit="°C")] = 25.0
     conductance: NotNegatives = 0.0
     body_capacity: Positives = 1.0
     body_loss: NotNegatives = 0.0

@@ -9,7 +9,7 @@ from typing import Annotated
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tca_mj.checks import Array, Checked, NotNegative, Positive, require_count, within
+from tca_mj.checks import Array, Checked, NotNegative, Positive, number, require_count, within
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -26,7 +26,7 @@ class CurrentSensor(Checked):
     """
 
     resolution: NotNegative = 0.8e-3
-    gain_error: Annotated[float, partial(within, above=-1.0, below=1.0, shape=())] = 0.0
+    gain_error: Annotated[float, partial(number, above=-1.0, below=1.0)] = 0.0
     noise: NotNegative = 1.3e-3
     pulse_frequency: Positive = 4e3
 
