@@ -1,6 +1,6 @@
 """The door: what comes from outside is what its type says, or it is refused by name and bound.
 
-``Checked`` checks the fields of a dataclass and ``checked`` the arguments of a function, both by
+``Checked`` checks the fields of a dataclass and ``door`` the arguments of a function, both by
 their types; what a type cannot say is checked by ``within`` and its like where it is needed.
 Every message reads ``name must ..., got ...``.
 """
@@ -31,6 +31,9 @@ Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 Check = Callable[[str, Any], Any]
 """From a name and a value to the value, as it goes on; it raises ValueError."""
+
+LARGEST, SMALLEST = 1e30, 1e-30
+"""No quantity of this field, in SI units, is larger or, but for 0, smaller; products overflow."""
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -86,7 +89,7 @@ def within(
     unit: str = "",
     shape: tuple[int, ...] | None = None,
 ) -> Array:
-    """``values`` as finite floats within bounds.
+    """``values`` as floats within bounds, none larger than ``LARGEST``.
 
     Args:
         name: What they are, for the message.
@@ -107,13 +110,15 @@ def within(
         return array
     least, most = float(array.min()), float(array.max())  # not a number if one is none
     if (
-        math.isfinite(least) and math.isfinite(most)
+        least >= -LARGEST and most <= LARGEST
         and above < least >= at_least and below > most <= at_most
     ):  # fmt: skip
         return array
     bounds = {"above": above, "at least": at_least, "below": below, "at most": at_most}
     said = [f"{word} {bound:.6g}" for word, bound in bounds.items() if math.isfinite(bound)]
     tail = f" {unit}" if unit and said else ""
+    if math.isfinite(least) and math.isfinite(most) and max(most, -least) > LARGEST:
+        said.append(f"at most {LARGEST:g} in size")
     must = " and ".join(["finite", *said])
     raise ValueError(f"{name} must be {must}{tail}, got {shown(values)}")
 
@@ -121,6 +126,20 @@ def within(
 def number(name: str, value: Any, **bounds: Any) -> float:
     """One number within bounds, which are those of ``within``; errors as there."""
     return float(within(name, value, shape=(), **bounds))
+
+
+def quantity(name: str, value: Any, **bounds: Any) -> float:
+    """A number within bounds that is 0 or no smaller than ``SMALLEST``; errors as ``within``."""
+    found = number(name, value, **bounds)
+    if 0.0 < abs(found) < SMALLEST:
+        raise ValueError(f"{name} must be 0 or at least {SMALLEST:g} in size, got {shown(value)}")
+    return found
+
+
+def instance(name: str, value: Any, kind: Any) -> None:
+    """Raises ValueError unless a value is of a kind: for what is called too often for ``door``."""
+    if not isinstance(value, kind):
+        raise ValueError(f"{name} must be {_word(kind)}, got {shown(value)}")
 
 
 def numbers(name: str, values: Any, **bounds: Any) -> float | Array:
@@ -177,12 +196,14 @@ def flags(name: str, values: ArrayLike) -> Flags:
     Raises:
         ValueError: If one of them is neither.
     """
-    array = np.asarray(values)
-    if array.dtype != np.bool_ or np.ma.isMaskedArray(values):
-        array = floats(name, values)
-        if not ((array == 0.0) | (array == 1.0)).all():
-            raise ValueError(f"{name} must be True or False, got {shown(values)}")
-    return array.astype(np.bool_)
+    try:
+        array = np.asarray(values)
+    except ValueError:  # ragged
+        array = np.empty(0, dtype=object)
+    known = array.dtype == np.bool_ or array.dtype.kind in "iuf"
+    if known and not np.ma.isMaskedArray(values) and ((array == 0) | (array == 1)).all():
+        return array.astype(np.bool_, copy=False)
+    raise ValueError(f"{name} must be True or False, got {shown(values)}")
 
 
 def text(name: str, value: Any) -> str:
@@ -199,7 +220,7 @@ def require_positive(**values: Any) -> None:
         ValueError: If one of them is no single number, not finite or not above 0.
     """
     for name, value in values.items():
-        number(name, value, above=0.0)
+        quantity(name, value, above=0.0)
 
 
 def require_count(**values: Any) -> None:
@@ -220,10 +241,10 @@ def require_one_of(name: str, value: Any, choices: Sequence[Any]) -> Any:
 
 
 # Types of fields and of arguments. The plurals are numbers or arrays of them.
-Finite = Annotated[float, number]
-Positive = Annotated[float, partial(number, above=0.0)]
-NotNegative = Annotated[float, partial(number, at_least=0.0)]
-Share = Annotated[float, partial(number, at_least=0.0, at_most=1.0)]
+Finite = Annotated[float, quantity]
+Positive = Annotated[float, partial(quantity, above=0.0)]
+NotNegative = Annotated[float, partial(quantity, at_least=0.0)]
+Share = Annotated[float, partial(quantity, at_least=0.0, at_most=1.0)]
 Temperature = Annotated[float, partial(number, above=-273.15)]
 Count = Annotated[int, partial(whole, at_least=1)]
 Seed = Annotated[int, partial(whole, at_least=0)]
@@ -231,7 +252,9 @@ Triple = Annotated[tuple[float, float, float], partial(row, shape=(3,))]
 Positives = Annotated[float | Array, partial(numbers, above=0.0)]
 NotNegatives = Annotated[float | Array, partial(numbers, at_least=0.0)]
 Limits = Annotated[float | Array, partial(limits, above=0.0)]
-Numbers = Annotated[ArrayLike, within]
+# Array-likes, which are arrays behind the door.
+Numbers = Annotated[Any, within]
+Temperatures = Annotated[Any, partial(within, above=-273.15)]
 
 
 class Checked:
@@ -256,14 +279,14 @@ class Checked:
                 object.__setattr__(self, name, kept)
 
 
-def checked(function: Callable[P, R]) -> Callable[P, R]:
+def door(function: Callable[P, R]) -> Callable[P, R]:
     """A function whose arguments are checked by their types, as fields of ``Checked`` are.
 
     It costs some microseconds a call: what runs in a loop checks what it needs by itself.
     """
 
     @wraps(function)
-    def door(*args: P.args, **kwargs: P.kwargs) -> R:
+    def entered(*args: P.args, **kwargs: P.kwargs) -> R:
         signature, checks = _arguments(function)
         bound = signature.bind(*args, **kwargs)
         given = bound.arguments
@@ -272,7 +295,7 @@ def checked(function: Callable[P, R]) -> Callable[P, R]:
                 given[name] = check(name, given[name])
         return function(*bound.args, **bound.kwargs)
 
-    return door
+    return entered
 
 
 @cache
@@ -312,6 +335,8 @@ def by_type(hint: Any) -> Check | None:
         return partial(_mapping, key=by_type(inner[0]), each=by_type(inner[1]))
     if origin is Callable:
         return _callable
+    if inspect.isclass(hint) and getattr(hint, "_is_protocol", False):
+        return partial(_alike, protocol=hint, members=_members(hint))
     if _is_kind(hint):
         return partial(_instance, kinds=(hint,), words=_word(hint))
     return None
@@ -324,7 +349,21 @@ def _is_kind(hint: Any) -> bool:
     return hint not in (Any, object) and not getattr(hint, "_is_protocol", False)
 
 
-_PLAIN: dict[Any, Check] = {float: number, int: whole, bool: flag, str: text}
+def _members(protocol: Any) -> tuple[str, ...]:
+    """What a protocol asks for, by name; a call operator is one of them."""
+    own = [vars(kind) for kind in protocol.__mro__ if getattr(kind, "_is_protocol", False)]
+    names = {name for each in own for name in (*each, *each.get("__annotations__", ()))}
+    return tuple(sorted(n for n in names if not n.startswith("_") or n == "__call__"))
+
+
+def _alike(name: str, value: Any, protocol: Any, members: Sequence[str]) -> Any:
+    missing = [member for member in members if not hasattr(value, member)]
+    if missing or (isinstance(value, type) and "__call__" not in members):
+        raise ValueError(f"{name} must be {_word(protocol)}, got {shown(value)}, without {missing}")
+    return value
+
+
+_PLAIN: dict[Any, Check] = {float: quantity, int: whole, bool: flag, str: text}
 _WORDS = {float: "a number", int: "a whole number", bool: "True or False", str: "a text",
           NoneType: "None"}  # fmt: skip
 
@@ -336,7 +375,7 @@ def _word(hint: Any) -> str:
         return _word(get_args(hint)[0])
     if get_origin(hint) is Literal:
         return f"one of {get_args(hint)}"
-    name: str = getattr(get_origin(hint) or hint, "__name__", str(hint))
+    name = str(getattr(get_origin(hint) or hint, "__name__", hint)).lstrip("_")
     return f"{'an' if name[:1] in 'AEIOU' else 'a'} {name}"
 
 

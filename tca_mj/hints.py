@@ -11,7 +11,7 @@ from collections.abc import Iterable
 from functools import partial
 from typing import Annotated, Any
 
-from tca_mj.checks import number
+from tca_mj.checks import quantity, shown
 
 
 def size(
@@ -31,22 +31,22 @@ def size(
     Raises:
         ValueError: If it is no number, or out of bounds.
     """
-    found = number(name, value, **({"above": 0.0} if at_least is None else {"at_least": at_least}))
+    found = quantity(name, value, **({"above": 0.0} if at_least is None else {"at_least": at_least}))
     if found > at_most:
         meant = _meant([found * 1e-3, found * 1e-6], 0.0, at_most, unit)
         raise ValueError(
-            f"{name} must be at most {at_most:g} {unit} ({kind} are below), got {value!r}{meant}"
+            f"{name} must be at most {at_most:g} {unit} ({kind} are below), got {shown(value)}{meant}"
         )
     return found
 
 
 def modulus(name: str, value: Any, *, kind: str = "gels", least: float = 1e3) -> float:
     """One modulus of elasticity, at least what the softest of a kind have [Pa]; as ``size``."""
-    found = number(name, value, above=0.0)
+    found = quantity(name, value, above=0.0)
     if found < least:
         meant = _meant([found * 1e6, found * 1e9], least, math.inf, "Pa")
         raise ValueError(
-            f"{name} must be at least {least:g} Pa ({kind} are above), got {value!r}{meant}"
+            f"{name} must be at least {least:g} Pa ({kind} are above), got {shown(value)}{meant}"
         )
     return found
 
@@ -54,9 +54,9 @@ def modulus(name: str, value: Any, *, kind: str = "gels", least: float = 1e3) ->
 def angle(name: str, value: Any, *, above: float = 0.0, below: float) -> float:
     """One angle between two others [rad]; errors as ``size``."""
     try:
-        return number(name, value, above=above, below=below, unit="rad")
+        return quantity(name, value, above=above, below=below, unit="rad")
     except ValueError as error:
-        degrees = isinstance(value, int | float) and math.isfinite(value)
+        degrees = isinstance(value, int | float) and abs(value) <= 360
         meant = _meant([math.radians(value)], above, below, "rad") if degrees else ""
         raise ValueError(f"{error}{meant}") from None
 

@@ -17,12 +17,28 @@ from functools import partial
 from typing import Annotated, Any, Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from tca_mj.checks import Array, Checked, Finite, number, require_count
+from tca_mj.checks import (
+    Array,
+    Checked,
+    Finite,
+    NotNegative,
+    Numbers,
+    Positive,
+    Triple,
+    door,
+    number,
+    quantity,
+    whole,
+)
 from tca_mj.hints import size
 
 _radius = partial(size, kind="soft bodies", at_least=0.0, at_most=1.0)
+MOST_TCAS = 100  # side by side: at a width of 1.3 mm they would fill a circle of 40 mm
+MOST_TURNS = 1000.0  # in one body: as close as TCAs lie, they would fill more than a metre
+
+TcaCount = Annotated[int, partial(whole, at_least=1, at_most=MOST_TCAS)]
+Turns = Annotated[float, partial(quantity, at_least=-MOST_TURNS, at_most=MOST_TURNS)]
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,11 +47,11 @@ class Helix(Checked):
 
     Attributes:
         radius: Distance to the centre line, not negative [m].
-        turns: Number of turns over the whole body; positive is right-handed.
+        turns: Number of turns over the whole body, at most 1000; positive is right-handed.
         phase: Angle at the base, from the cross-section's x axis towards y [rad].
 
     Raises:
-        ValueError: If a number is not finite or the radius is negative.
+        ValueError: If a number is not finite or out of range.
 
     Example:
         >>> from tca_mj import Helix
@@ -45,7 +61,7 @@ class Helix(Checked):
     """
 
     radius: Annotated[float, _radius]
-    turns: Finite = 0.0
+    turns: Turns = 0.0
     phase: Finite = 0.0
 
     @property
@@ -53,20 +69,22 @@ class Helix(Checked):
         """The route as a tuple of legs: a helix is its own single leg."""
         return (self,)
 
-    def offset(self, s: ArrayLike) -> Array:
+    @door
+    def offset(self, s: Numbers) -> Array:
         """Offset from the centre line at ``s`` in [0, 1], shape (..., 2) [m]."""
-        angle = self.phase + 2.0 * np.pi * self.turns * np.asarray(s, dtype=np.float64)
+        angle = self.phase + 2.0 * np.pi * self.turns * s
         return self.radius * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
 
-    def slope(self, s: ArrayLike) -> Array:
+    @door
+    def slope(self, s: Numbers) -> Array:
         """Derivative of the offset by ``s``, shape (..., 2) [m]."""
         rate = 2.0 * np.pi * self.turns
-        angle = self.phase + rate * np.asarray(s, dtype=np.float64)
+        angle = self.phase + rate * s
         return self.radius * rate * np.stack([-np.sin(angle), np.cos(angle)], axis=-1)
 
 
 @dataclass(frozen=True, slots=True)
-class UTurn:
+class UTurn(Checked):
     """One TCA folded in half: out along one leg, back along another one.
 
     Two parallel legs make the U of a bending finger, two helices of the same hand the double
@@ -75,6 +93,9 @@ class UTurn:
     Attributes:
         out: The leg from base to tip.
         back: The leg from tip to base, also described from base to tip.
+
+    Raises:
+        ValueError: If a leg is no ``Helix``.
     """
 
     out: Helix
@@ -86,6 +107,7 @@ class UTurn:
         return (self.out, self.back)
 
     @classmethod
+    @door
     def parallel(cls, offset: float, half_width: float, direction: float = 0.0) -> UTurn:
         """A U of two straight legs.
 
@@ -102,9 +124,20 @@ class UTurn:
         return cls(Helix(radius, phase=direction - angle), Helix(radius, phase=direction + angle))
 
     @classmethod
-    def double_helix(cls, radius: float, turns: float, phase: float = 0.0) -> UTurn:
+    @door
+    def double_helix(cls, radius: NotNegative, turns: Turns, phase: float = 0.0) -> UTurn:
         """A TCA folded in half and wound as two helices of ``turns`` turns, half a turn apart."""
         return cls(Helix(radius, turns, phase), Helix(radius, turns, phase + np.pi))
+
+
+class _Leg(Protocol):
+    """A curve along a body, from its base to its tip."""
+
+    def offset(self, s: Any, /) -> Any:
+        """Offset from the centre line at ``s`` in [0, 1], shape (..., 2) [m]."""
+
+    def slope(self, s: Any, /) -> Any:
+        """Derivative of the offset by ``s``, shape (..., 2) [m]."""
 
 
 class Route(Protocol):
@@ -135,11 +168,12 @@ def require_route(name: str, route: Any) -> Any:
     )
 
 
-def parallel(count: int, radius: float, phase: float = 0.0) -> tuple[Helix, ...]:
+@door
+def parallel(count: TcaCount, radius: NotNegative, phase: float = 0.0) -> tuple[Helix, ...]:
     """Routes of ``count`` straight TCAs at equal angles round the centre line.
 
     Args:
-        count: Number of TCAs, at least 1.
+        count: Number of TCAs, 1 to 100.
         radius: Their distance to the centre line, not negative [m].
         phase: Angle of the first one, from the cross-section's x axis towards y [rad].
 
@@ -151,13 +185,14 @@ def parallel(count: int, radius: float, phase: float = 0.0) -> tuple[Helix, ...]
         >>> [round(route.phase, 2) for route in parallel(3, 4e-3)]
         [0.0, 2.09, 4.19]
     """
-    require_count(count=count)
     return tuple(Helix(radius, phase=phase + 2.0 * np.pi * i / count) for i in range(count))
 
 
+@door
 def leg_length(
-    leg: Helix, body_length: float, curvature: ArrayLike = (0.0, 0.0, 0.0), points: int = 513
-) -> float:
+    leg: _Leg, body_length: Positive, curvature: Triple = (0.0, 0.0, 0.0),
+    points: Annotated[int, partial(whole, at_least=2, at_most=1_000_000)] = 513,
+) -> float:  # fmt: skip
     """Length of a leg in a body of uniform reference curvature.
 
     Integrates |w|, w = e_z + u x r + r', the tangent of the leg per length of the centre line
@@ -167,13 +202,13 @@ def leg_length(
         leg: The leg.
         body_length: Length of the centre line [m].
         curvature: Reference curvature u of the body in its own frame, shape (3,) [1/m].
-        points: Number of points of the trapezoid rule.
+        points: Number of points of the trapezoid rule, 2 to a million.
 
     Returns:
         Path length [m].
 
     Raises:
-        ValueError: If ``leg`` is a whole route or several.
+        ValueError: If ``leg`` is a whole route or several, or a number out of range.
     """
     if not hasattr(leg, "slope"):
         legs = len(require_route("leg", leg).legs)
@@ -181,7 +216,7 @@ def leg_length(
     s = np.linspace(0.0, 1.0, points)
     r = leg.offset(s)
     slope = leg.slope(s) / body_length
-    u = np.asarray(curvature, dtype=np.float64)
+    u = curvature
     (x, y), (dx, dy) = r.T, slope.T
     w = np.stack([dx - u[2] * y, dy + u[2] * x, 1.0 + u[0] * y - u[1] * x], axis=-1)
     return float(np.trapezoid(np.linalg.norm(w, axis=-1), s) * body_length)

@@ -15,7 +15,15 @@ from typing import Annotated, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tca_mj.checks import Array, Checked, Positive, shown, within
+from tca_mj.checks import (
+    Array,
+    Checked,
+    Positive,
+    door,
+    require_one_of,
+    shown,
+    within,
+)
 
 Row = tuple[float, ...]
 
@@ -75,6 +83,7 @@ class Gait(Checked):
         """Number of legs."""
         return len(self.offset)
 
+    @door
     def temperature(self, phase: ArrayLike) -> Array:
         """Temperatures to reach at a phase of the cycle.
 
@@ -87,9 +96,11 @@ class Gait(Checked):
         phase = within("phase", phase)[..., None, None]
         into = (phase + np.array(self.offset)[:, None] - np.array(self.start)) % 1.0
         target = np.where(into < np.array(self.duty), np.array(self.hot), np.array(self.warm))
-        return target.reshape(*target.shape[:-2], -1)
+        return target.reshape(*target.shape[:-2], self.legs * target.shape[-1])
 
+    @door
     def table(self, name: str) -> Array:
         """``start``, ``duty``, ``hot`` or ``warm`` of every leg, shape (legs, TCAs per leg)."""
+        require_one_of("name", name, ("start", "duty", "hot", "warm"))
         row = np.array(getattr(self, name))
         return np.broadcast_to(row, (self.legs, row.shape[-1])).copy()

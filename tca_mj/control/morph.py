@@ -17,7 +17,15 @@ from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from typing import NamedTuple
 
-from tca_mj.checks import Checked, NotNegative, Positive, number, require_positive
+from tca_mj.checks import (
+    Checked,
+    NotNegative,
+    Positive,
+    door,
+    instance,
+    number,
+    require_positive,
+)
 from tca_mj.control.pi import PiSpec, PiState, pi_rest, pi_step
 
 # A module is steady when it turns less than this in 20 s, Sun, Section 6.2.1 [rad].
@@ -199,6 +207,7 @@ class MorphSequence(Checked):
         number("highest_temperature", self.highest_temperature, above=hot, unit="°C")
         number("hold_limit", self.hold_limit, above=self.hold_time, unit="s")
 
+    @door
     def start(self, target: float | None) -> MorphState:
         """A new sequence, in whatever shape and temperature the module is.
 
@@ -213,6 +222,7 @@ class MorphSequence(Checked):
             number("target", target, unit="rad")
         return MorphState(Phase.SOFTEN, target)
 
+    @door
     def abort(self, state: MorphState) -> MorphState:
         """Stops at once with everything off: a TCA that relaxes comes to no harm."""
         return state if state.over else MorphState(Phase.RELEASE, state.target)
@@ -235,6 +245,8 @@ class MorphSequence(Checked):
             ValueError: If ``dt`` is not finite and positive.
         """
         require_positive(dt=dt)
+        instance("state", state, MorphState)
+        instance("measured", measured, Measurement)
         if state.over:
             return state, OFF
         if state.phase is Phase.RELEASE:

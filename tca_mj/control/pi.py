@@ -18,7 +18,17 @@ from typing import Annotated
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tca_mj.checks import Array, Checked, NotNegatives, limits, numbers, require_positive, within
+from tca_mj.checks import (
+    Array,
+    Checked,
+    NotNegatives,
+    door,
+    instance,
+    limits,
+    numbers,
+    require_positive,
+    within,
+)
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -63,6 +73,7 @@ class PiState:
     arrived: NDArray[np.bool_]
 
 
+@door
 def pi_rest(shape: tuple[int, ...] = ()) -> PiState:
     """State before the first step.
 
@@ -87,6 +98,8 @@ def pi_step(spec: PiSpec, state: PiState, error: ArrayLike, dt: float) -> tuple[
     Raises:
         ValueError: If an error is not finite, or ``dt`` not above 0 and finite.
     """
+    instance("spec", spec, PiSpec)
+    instance("state", state, PiState)
     error = within("error", error)
     require_positive(dt=dt)
     arrives = ~state.arrived & (np.abs(error) <= spec.near) & (np.asarray(spec.near) > 0.0)

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from tca_mj.checks import Checked, NotNegative, Positive, Triple, require_positive, row
+from tca_mj.checks import Checked, NotNegative, Positive, Triple, door, row
 from tca_mj.hints import size
 
 
@@ -37,7 +37,8 @@ class Outline(Checked):
                 f" got {self.half_height}"
             )
 
-    def contains(self, x: float, y: float, tolerance: float = 1e-9) -> bool:
+    @door
+    def contains(self, x: float, y: float, tolerance: NotNegative = 1e-9) -> bool:
         """Whether the point (x, y) [m] of the section lies inside the contour."""
         if self.round:
             return bool(np.hypot(x, y) <= self.half_width + tolerance)
@@ -91,15 +92,16 @@ class BeamSpec(Checked):
         return self.line_density * self.length
 
     @classmethod
+    @door
     def circular(
         cls,
         *,
-        length: float,
-        diameter: float,
-        young: float,
-        shear: float,
-        density: float,
-        outer_diameter: float | None = None,
+        length: Positive,
+        diameter: Positive,
+        young: Positive,
+        shear: Positive,
+        density: Positive,
+        outer_diameter: Positive | None = None,
         **more: Any,
     ) -> BeamSpec:
         """A round beam.
@@ -117,8 +119,6 @@ class BeamSpec(Checked):
             ValueError: If a dimension or a modulus is not positive.
         """
         outer = diameter if outer_diameter is None else outer_diameter
-        require_positive(length=length, diameter=diameter, young=young, shear=shear,
-                         density=density, outer_diameter=outer)  # fmt: skip
         area = np.pi * diameter**2 / 4.0
         inertia = np.pi * diameter**4 / 64.0
         outline = Outline(outer / 2.0, outer / 2.0)
@@ -129,15 +129,16 @@ class BeamSpec(Checked):
         )  # fmt: skip
 
     @classmethod
+    @door
     def box(
         cls,
         *,
-        length: float,
-        width: float,
-        height: float,
-        young: float,
-        shear: float,
-        density: float,
+        length: Positive,
+        width: Positive,
+        height: Positive,
+        young: Positive,
+        shear: Positive,
+        density: Positive,
         **more: Any,
     ) -> BeamSpec:
         """A beam of rectangular section, ``width`` along x and ``height`` along y; else as round.
@@ -148,8 +149,6 @@ class BeamSpec(Checked):
         Raises:
             ValueError: If a dimension or a modulus is not positive.
         """
-        require_positive(length=length, width=width, height=height, young=young, shear=shear,
-                         density=density)  # fmt: skip
         area = width * height
         return cls(
             length=length,
@@ -160,7 +159,8 @@ class BeamSpec(Checked):
         )  # fmt: skip
 
 
-def torsion_constant(width: float, height: float) -> float:
+@door
+def torsion_constant(width: Positive, height: Positive) -> float:
     """Saint-Venant's torsion constant J of a rectangle [m⁴].
 
     J = a b³ (1/3 - 64/π⁵ b/a Σ tanh(nπa/2b)/n⁵), n odd, a the longer side

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from numbers import Integral
-from typing import Any
+from functools import partial
+from typing import Annotated, Any
 
 from numpy.typing import ArrayLike
 
-from tca_mj.checks import require_one_of
+from tca_mj.checks import door, require_one_of, whole
 from tca_mj.rod.beam import BeamSpec
 from tca_mj.rod.energy.solver import minimise
 from tca_mj.rod.problem import Segment, StaticProblem, StrandLaw
@@ -19,6 +19,7 @@ from tca_mj.routes import Route
 SOLVERS = ("shooting", "energy")
 
 
+@door
 def solve_static(
     beam: BeamSpec, routes: Sequence[Route], tensions: Sequence[float | StrandLaw], **options: Any
 ) -> RodShape:
@@ -52,6 +53,7 @@ def solve_static(
     return solve_series([Segment(beam, routes, tensions)], **options)[0]
 
 
+@door
 def solve_series(
     segments: Sequence[Segment],
     *,
@@ -60,7 +62,7 @@ def solve_series(
     gravity: ArrayLike = (0.0, 0.0, 0.0),
     solver: str = "shooting",
     shearable: bool = True,
-    points: int = 65,
+    points: Annotated[int, partial(whole, at_least=2, at_most=10_000)] = 65,
 ) -> tuple[RodShape, ...]:
     """Static shapes of soft bodies in series, each on the tip of the one before.
 
@@ -78,7 +80,7 @@ def solve_series(
             energy over the motions of the sections. They share the section's energy, no more.
         shearable: Whether sections shear. Without, the rod still stretches: what a chain of
             hinges and slides is.
-        points: Number of points of each segment, at equal distances, at least 2. It has no
+        points: Number of points of each segment, at equal distances, 2 to 10 000. It has no
             influence on accuracy.
 
     Returns:
@@ -90,7 +92,5 @@ def solve_series(
         RodSolveError: If no state is found, with what is left of the equations.
     """
     require_one_of("solver", solver, SOLVERS)
-    if not isinstance(points, Integral) or points < 2:
-        raise ValueError(f"points must be a whole number of at least 2, got {points!r}")
     problem = StaticProblem(segments, tip_force, tip_moment, gravity, shearable)
-    return (minimise if solver == "energy" else solve)(problem, int(points))
+    return (minimise if solver == "energy" else solve)(problem, points)

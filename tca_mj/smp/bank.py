@@ -8,7 +8,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tca_mj.checks import floats
+from tca_mj.checks import door, instance, shown, within
 from tca_mj.smp.fixing import SpineState, Spring, advance, spring
 from tca_mj.smp.heater import HeaterSpec, HeaterState, heat_spine
 from tca_mj.smp.material import SmpSpec, SpineSpec
@@ -37,6 +37,7 @@ class SpineBank:
         owner: Index of each joint's spine, shape (m,).
     """
 
+    @door
     def __init__(
         self, specs: Sequence[SpineSpec], heaters: Sequence[HeaterSpec], owner: ArrayLike
     ) -> None:
@@ -51,15 +52,16 @@ class SpineBank:
             ValueError: If there is no spine, the numbers differ, the materials differ, or an
                 owner does not exist.
         """
-        if not specs or len(specs) != len(heaters):
+        if not len(specs) or len(specs) != len(heaters):
             raise ValueError(
                 f"specs and heaters must be as many, at least 1, got {len(specs)}, {len(heaters)}"
             )
         if any(spec.smp != specs[0].smp for spec in specs):
             raise ValueError("specs must all be of one material smp")
-        self.owner = np.asarray(owner, dtype=np.int64)
-        if self.owner.ndim != 1 or not ((self.owner >= 0) & (self.owner < len(specs))).all():
-            raise ValueError(f"owner must be indices below {len(specs)}, got {owner!r}")
+        index = within("owner", owner, at_least=0.0, below=len(specs))
+        if index.ndim != 1 or (index % 1.0).any():
+            raise ValueError(f"owner must be indices, shape (m,), got {shown(owner)}")
+        self.owner = index.astype(np.int64)
         self.smp: SmpSpec = specs[0].smp
         names = [field.name for field in fields(HeaterSpec)]
         self.heater = HeaterSpec(**{name: column(heaters, name) for name in names})
@@ -69,6 +71,7 @@ class SpineBank:
         """Number of spines."""
         return len(np.asarray(self.heater.capacity))
 
+    @door
     def rest(self, memory: ArrayLike, shape: ArrayLike | None = None) -> SpinesState:
         """Cold spines without stress.
 
@@ -76,13 +79,18 @@ class SpineBank:
             memory: Memorised angles, shape (..., m) [rad].
             shape: Angles in which they were fixed, the same shape; by default the memorised ones.
                 Between the two only the rubber pulls, as after an ideal fixing [rad].
+
+        Raises:
+            ValueError: If an angle is not finite, or the shapes differ.
         """
-        memory = floats("memory", memory)
+        memory = within("memory", memory)
+        if memory.shape[-1:] != self.owner.shape:
+            raise ValueError(f"memory must have shape (..., {self.owner.size}), got {memory.shape}")
         heat = HeaterState.rest(self.heater, (*memory.shape[:-1], self.n))
         state = SpineState.rest(self.smp, memory, heat.temperature[..., self.owner])
         if shape is not None:
             # The glass is strained so far that it holds the rubber in the shape.
-            shape = floats("shape", shape)
+            shape = within("shape", shape, shape=memory.shape)
             frozen = shape + self.smp.rubbery / state.glass * (shape - memory)
             state = SpineState(state.memory, frozen, state.glass)
         return SpinesState(heat, state)
@@ -102,10 +110,12 @@ class SpineBank:
         Raises:
             ValueError: If an input is not finite.
         """
+        instance("state", state, SpinesState)
         heat = heat_spine(self.heater, state.heat, voltage, fan, dt)
         memory = advance(self.smp, state.memory, angle, heat.temperature[..., self.owner])
         return SpinesState(heat, memory)
 
     def spring(self, state: SpinesState) -> Spring:
         """Modulus [Pa] and reference [rad] of each joint, shape (..., m)."""
+        instance("state", state, SpinesState)
         return spring(self.smp, state.memory)

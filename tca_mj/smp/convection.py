@@ -12,11 +12,19 @@ from typing import Annotated
 
 from scipy.optimize import brentq
 
-from tca_mj.checks import Checked, Positive, number, require_positive
+from tca_mj.checks import Checked, Positive, Share, door, number, quantity
 
 _ZERO = 273.15  # 0 °C [K]
 _STEFAN_BOLTZMANN = 5.670374e-8  # [W/(m² K⁴)]
 _GRAVITY = 9.81  # [m/s²]
+
+
+AirTemperature = Annotated[float, partial(number, at_least=-100.0, at_most=600.0, unit="°C")]
+"""Within the range of the laws for air."""
+Diameter = Annotated[float, partial(quantity, above=0.0, at_most=1.0, unit="m")]
+"""Of what is slender; beyond, the flow of air is another one."""
+Speed = Annotated[float, partial(quantity, above=0.0, at_most=100.0, unit="m/s")]
+"""Below a third of the speed of sound, as the laws ask for."""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -27,7 +35,7 @@ class Air(Checked):
         temperature: Temperature [°C].
     """
 
-    temperature: Annotated[float, partial(number, at_least=-100.0, at_most=600.0, unit="°C")]
+    temperature: AirTemperature
 
     @property
     def expansion(self) -> float:
@@ -57,7 +65,8 @@ class Air(Checked):
         return 1.458e-6 * kelvin**1.5 / (kelvin + 110.4)
 
 
-def still_air(diameter: float, surface: float, ambient: float) -> float:
+@door
+def still_air(diameter: Diameter, surface: AirTemperature, ambient: AirTemperature) -> float:
     """Coefficient of natural convection from a long horizontal cylinder [W/(m² K)].
 
     Churchill & Chu, Int. J. Heat Mass Transfer 18, 1049 (1975), for Ra up to 1e12.
@@ -68,9 +77,9 @@ def still_air(diameter: float, surface: float, ambient: float) -> float:
         ambient: Temperature of the air [°C].
 
     Raises:
-        ValueError: If the diameter is not positive or the surface not hotter than the air.
+        ValueError: If a number is out of range or the surface not hotter than the air.
     """
-    require_positive(diameter=diameter, excess=surface - ambient)
+    number("surface", surface, above=ambient, unit="°C, of ambient")
     air = Air(temperature=0.5 * (surface + ambient))
     buoyancy = _GRAVITY * air.expansion * (surface - ambient)
     rayleigh = buoyancy * diameter**3 * air.prandtl / air.viscosity**2
@@ -79,7 +88,10 @@ def still_air(diameter: float, surface: float, ambient: float) -> float:
     return nusselt * air.conductivity / diameter
 
 
-def moving_air(diameter: float, speed: float, surface: float, ambient: float) -> float:
+@door
+def moving_air(
+    diameter: Diameter, speed: Speed, surface: AirTemperature, ambient: AirTemperature
+) -> float:
     """Coefficient of forced convection from a long cylinder across the stream [W/(m² K)].
 
     Churchill & Bernstein, J. Heat Transfer 99, 300 (1977), for Re Pr above 0.2.
@@ -91,9 +103,8 @@ def moving_air(diameter: float, speed: float, surface: float, ambient: float) ->
         ambient: Temperature of the air [°C].
 
     Raises:
-        ValueError: If the diameter or the speed is not positive.
+        ValueError: If a number is out of range.
     """
-    require_positive(diameter=diameter, speed=speed)
     air = Air(temperature=0.5 * (surface + ambient))
     reynolds = speed * diameter / air.viscosity
     shape = (1.0 + (0.4 / air.prandtl) ** (2 / 3)) ** 0.25
@@ -102,13 +113,17 @@ def moving_air(diameter: float, speed: float, surface: float, ambient: float) ->
     return nusselt * air.conductivity / diameter
 
 
-def radiation(surface: float, ambient: float, emissivity: float = 0.9) -> float:
+@door
+def radiation(surface: AirTemperature, ambient: AirTemperature, emissivity: Share = 0.9) -> float:
     """Coefficient of radiation to surroundings at the temperature of the air [W/(m² K)].
 
     Args:
         surface: Temperature of the surface [°C].
         ambient: Temperature of the surroundings [°C].
-        emissivity: Emissivity [1]; the default is an estimate for polymers.
+        emissivity: Emissivity, 0 to 1 [1]; the default is an estimate for polymers.
+
+    Raises:
+        ValueError: If a number is out of range.
     """
     hot, cold = surface + _ZERO, ambient + _ZERO
     return emissivity * _STEFAN_BOLTZMANN * (hot * hot + cold * cold) * (hot + cold)
@@ -152,6 +167,7 @@ class Slab(Checked):
         diffusivity = self.conductivity / self.capacity
         return (0.5 * self.thickness / self.root) ** 2 / diffusivity
 
+    @door
     def centre_time(self, excess_ratio: float) -> float:
         """Time until the centre of a uniformly hot plate is cooled by a ratio, first mode [s].
 

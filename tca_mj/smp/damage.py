@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tca_mj.checks import Array, Checked, Positive, floats, number, within
+from tca_mj.checks import Array, Checked, Numbers, Positive, door, flags, instance, number, within
 from tca_mj.smp.material import SOFT_MODULUS, SmpSpec, SpineSpec
 
 Flags = NDArray[np.bool_]
@@ -51,6 +51,7 @@ class DamageSpec(Checked):
         number("soft_modulus", self.soft_modulus, below=self.rigid_modulus, unit="Pa")
 
     @classmethod
+    @door
     def of(cls, smp: SmpSpec) -> DamageSpec:
         """Bounds for a material: rigid is its modulus at the lower end of its transition."""
         return cls(rigid_modulus=float(smp.modulus(smp.rigid_below)))
@@ -70,7 +71,8 @@ class Damage(NamedTuple):
     hardening: Flags
 
 
-def soft_bending_rate(spine: SpineSpec, tension_rate: ArrayLike) -> Array:
+@door
+def soft_bending_rate(spine: SpineSpec, tension_rate: Numbers) -> Array:
     """How fast a TCA would bend the spine if it were soft: 2 a L/(E_r I) dF/dt [rad/s].
 
     That is the motion which the TCA is commanded to make, whatever the spine allows.
@@ -82,7 +84,7 @@ def soft_bending_rate(spine: SpineSpec, tension_rate: ArrayLike) -> Array:
     """
     stiffness = spine.smp.rubbery * spine.second_moment
     lever = 2.0 * spine.tca_offset * spine.length / stiffness
-    return lever * floats("tension_rate", tension_rate)
+    return lever * tension_rate
 
 
 def flag_damage(
@@ -111,10 +113,11 @@ def flag_damage(
     Raises:
         ValueError: If a number is not finite.
     """
-    spec = spec or DamageSpec()
+    spec = DamageSpec() if spec is None else spec
+    instance("spec", spec, DamageSpec)
     modulus, rate = within("modulus", modulus), within("bending_rate", bending_rate)
     stiff = modulus > spec.soft_modulus
-    hardening = stiff & (modulus < spec.rigid_modulus) & np.asarray(cooling, dtype=bool)
+    hardening = stiff & (modulus < spec.rigid_modulus) & flags("cooling", cooling)
     taut = within("tension", tension) > spec.slack
     return Damage(
         damaged=stiff & taut & (rate > spec.steady_rate),

@@ -29,7 +29,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tca_mj.checks import Array, within
+from tca_mj.checks import Array, Temperatures, door, instance, within
 from tca_mj.smp.material import SmpSpec
 
 
@@ -48,6 +48,7 @@ class SpineState:
     glass: Array
 
     @classmethod
+    @door
     def rest(cls, smp: SmpSpec, memory: ArrayLike, temperature: ArrayLike = 25.0) -> SpineState:
         """A spine in its memorised shape at a temperature, without stress.
 
@@ -91,6 +92,8 @@ def advance(
     Raises:
         ValueError: If a number is not finite.
     """
+    instance("smp", smp, SmpSpec)
+    instance("state", state, SpineState)
     angle = within("angle", angle)
     glass = smp.glass(temperature) + np.zeros_like(state.glass)
     grown = np.maximum(glass - state.glass, 0.0)
@@ -106,11 +109,14 @@ def spring(smp: SmpSpec, state: SpineState) -> Spring:
         smp: The material.
         state: State, shape (..., n).
     """
+    instance("smp", smp, SmpSpec)
+    instance("state", state, SpineState)
     modulus = smp.rubbery + state.glass
     share = state.glass / modulus
     return Spring(modulus, state.memory + share * (state.frozen - state.memory))
 
 
+@door
 def stored_energy(smp: SmpSpec, state: SpineState, angle: ArrayLike) -> Array:
     """Elastic energy of each joint over I/ds, shape (..., n) [Pa rad²].
 
@@ -130,7 +136,8 @@ def stored_energy(smp: SmpSpec, state: SpineState, angle: ArrayLike) -> Array:
     return 0.5 * (smp.rubbery * soft * soft + state.glass * hard * hard)
 
 
-def fixity(smp: SmpSpec, hot: ArrayLike, cold: ArrayLike) -> Array:
+@door
+def fixity(smp: SmpSpec, hot: Temperatures, cold: Temperatures) -> Array:
     """Share of a deformation kept after cooling under load and unloading, 1 - E_hot/E_cold [1].
 
     Args:
@@ -141,7 +148,8 @@ def fixity(smp: SmpSpec, hot: ArrayLike, cold: ArrayLike) -> Array:
     return 1.0 - smp.modulus(hot) / smp.modulus(cold)
 
 
-def recovery(smp: SmpSpec, hot: ArrayLike) -> Array:
+@door
+def recovery(smp: SmpSpec, hot: Temperatures) -> Array:
     """Share of a fixed deformation that heating without load takes back, E_r/E(hot) [1].
 
     Args:

@@ -19,8 +19,19 @@ from typing import Annotated
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tca_mj.checks import Array, Checked, Positives, floats, number, numbers, require_positive
-from tca_mj.smp.convection import Slab, moving_air, radiation, still_air
+from tca_mj.checks import (
+    Array,
+    Checked,
+    Positive,
+    Positives,
+    door,
+    flags,
+    instance,
+    number,
+    numbers,
+    within,
+)
+from tca_mj.smp.convection import Slab, Speed, moving_air, radiation, still_air
 from tca_mj.smp.material import SpineSpec
 from tca_mj.tca import HeatSpec, power_from_voltage
 from tca_mj.tca.thermal import bare_step
@@ -32,6 +43,9 @@ FAN_COOL_TIME = 12.0  # the same with the fan, Sun, Section 6.1.3; a check [s]
 FAN_SPEED = 1.0  # speed of the fan's air, Sun, Section 6.1.3 [m/s]
 # Temperature that 9.5 V holds, printed in a figure only [°C]. Estimate: 10 K into the soft range.
 HOLD_TEMPERATURE = 120.0
+
+Hot = Annotated[float, partial(number, above=COOL_TO, at_most=600.0, unit="°C")]
+Cold = Annotated[float, partial(number, at_least=-100.0, below=COOL_TO, unit="°C")]
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -56,15 +70,16 @@ class HeaterSpec(Checked):
     ambient: Annotated[float | Array, partial(numbers, above=-273.15, unit="°C")] = 25.0
 
     @classmethod
+    @door
     def fitted(
         cls,
         spine: SpineSpec,
         *,
-        hold_temperature: float = HOLD_TEMPERATURE,
-        hold_voltage: float = HOLD_VOLTAGE,
-        cool_time: float = COOL_TIME,
-        fan_speed: float = FAN_SPEED,
-        ambient: float = 25.0,
+        hold_temperature: Hot = HOLD_TEMPERATURE,
+        hold_voltage: Positive = HOLD_VOLTAGE,
+        cool_time: Positive = COOL_TIME,
+        fan_speed: Speed = FAN_SPEED,
+        ambient: Cold = 25.0,
     ) -> HeaterSpec:
         """Constants from the natural cooling alone.
 
@@ -81,9 +96,6 @@ class HeaterSpec(Checked):
         Raises:
             ValueError: If a number is out of range.
         """
-        require_positive(hold_voltage=hold_voltage, cool_time=cool_time, fan_speed=fan_speed)
-        number("hold_temperature", hold_temperature, above=COOL_TO, unit="°C")
-        number("ambient", ambient, below=COOL_TO, unit="°C")
         excess = hold_temperature - ambient
         loss = spine.heat_capacity * math.log(excess / (COOL_TO - ambient)) / cool_time
         return cls(
@@ -92,22 +104,25 @@ class HeaterSpec(Checked):
             resistance=hold_voltage**2 / (loss * excess), ambient=ambient,
         )  # fmt: skip
 
+    @door
     def heat(self, fan: ArrayLike = False) -> HeatSpec:
         """The heat balance with the fan on or off, shape (..., n)."""
         return HeatSpec(capacity=self.capacity, loss=self.losing(fan), ambient=self.ambient)
 
     def losing(self, fan: ArrayLike) -> Array:
         """Heat lost per excess temperature with the fan on or off, shape (..., n) [W/K]."""
-        return np.where(np.asarray(fan, dtype=bool), self.loss * self.fan_gain, self.loss)
+        return np.where(flags("fan", fan), self.loss * self.fan_gain, self.loss)
 
     def power(self, voltage: ArrayLike) -> Array:
         """Power V²/R of the heater, shape (..., n) [W]."""
         return power_from_voltage(voltage, self.resistance)
 
+    @door
     def settled(self, voltage: ArrayLike, fan: ArrayLike = False) -> Array:
         """Temperature that a voltage holds in the long run, shape (..., n) [°C]."""
         return self.ambient + self.power(voltage) / self.heat(fan).loss
 
+    @door
     def time_to(
         self, target: ArrayLike, start: ArrayLike, voltage: ArrayLike = 0.0, fan: ArrayLike = False
     ) -> Array:
@@ -120,8 +135,8 @@ class HeaterSpec(Checked):
             fan: Whether the fan blows, same shape.
         """
         settled, tau = self.settled(voltage, fan), np.asarray(self.heat(fan).time_constant)
-        now = floats("start", start) - settled
-        now, then = np.broadcast_arrays(now, floats("target", target) - settled)
+        now = within("start", start) - settled
+        now, then = np.broadcast_arrays(now, within("target", target) - settled)
         # From here the spine goes straight towards what the voltage holds, and never past it.
         ratio = np.divide(now, then, out=np.where(now == 0.0, 1.0, 0.0), where=then != 0.0)
         return np.where(ratio >= 1.0, tau * np.log(np.maximum(ratio, 1.0)), np.inf)
@@ -142,6 +157,7 @@ class HeaterState:
     energy_lost: Array
 
     @classmethod
+    @door
     def rest(cls, spec: HeaterSpec, shape: tuple[int, ...] = ()) -> HeaterState:
         """At the temperature of the surroundings, no energy counted."""
         temperature = np.broadcast_to(spec.ambient, shape).copy()
@@ -163,15 +179,23 @@ def heat_spine(
     Raises:
         ValueError: If a voltage is not finite, or ``dt`` negative.
     """
+    instance("spec", spec, HeaterSpec)
+    instance("state", state, HeaterState)
     power, loss = spec.power(voltage), spec.losing(fan)
     number("dt", dt, at_least=0.0, unit="s")
     temperature, lost = bare_step(
         state.temperature, power, spec.capacity, loss, spec.ambient, dt
     )
+    if np.shape(temperature) != np.shape(state.temperature):
+        raise ValueError(
+            f"voltage and fan must fit the state's shape {np.shape(state.temperature)},"
+            f" got {np.shape(voltage)} and {np.shape(fan)}"
+        )
     return HeaterState(temperature, state.energy_in + power * dt, state.energy_lost + lost)
 
 
-def fan_gain(spine: SpineSpec, speed: float, start: float, ambient: float) -> float:
+@door
+def fan_gain(spine: SpineSpec, speed: Speed, start: Hot, ambient: Cold) -> float:
     """How many times sooner the fan cools the spine from ``start`` to 80 °C.
 
     Air across a cylinder with the module's perimeter, still or at ``speed``, with radiation; all
@@ -187,6 +211,9 @@ def fan_gain(spine: SpineSpec, speed: float, start: float, ambient: float) -> fl
 
     Returns:
         Ratio of the two times, at least 1 [1].
+
+    Raises:
+        ValueError: If a number is out of range.
     """
     ratio = (start - ambient) / (COOL_TO - ambient)
     surface = ambient + (start - COOL_TO) / math.log(ratio)

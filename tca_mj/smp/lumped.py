@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tca_mj.checks import Array
+from tca_mj.checks import Array, Numbers, door
 from tca_mj.smp.damage import Damage, DamageSpec, flag_damage, soft_bending_rate
 from tca_mj.smp.fixing import SpineState, advance, spring
 from tca_mj.smp.heater import HeaterSpec, HeaterState, heat_spine
@@ -27,6 +27,7 @@ class ModuleSolveError(ArithmeticError):
     """The balance of the module's torques was not found."""
 
 
+@door
 def in_tube(tca: TcaSpec, touching: float = 0.0) -> TcaSpec:
     """A TCA in its silicone tube.
 
@@ -40,6 +41,7 @@ def in_tube(tca: TcaSpec, touching: float = 0.0) -> TcaSpec:
     return in_silicone(tca, section=section, perimeter=perimeter, touching=touching)
 
 
+@door
 def sheathed(tca: TcaSpec, spine: SpineSpec) -> TcaSpec:
     """A TCA in its tube, U-shaped along the spine and unloaded when the spine is straight.
 
@@ -81,6 +83,7 @@ class LumpedModule:
         damage: Bounds of the damage rule.
     """
 
+    @door
     def __init__(
         self, spine: SpineSpec, heater: HeaterSpec, tca: TcaSpec, damage: DamageSpec | None = None
     ) -> None:
@@ -105,6 +108,7 @@ class LumpedModule:
             return 0.0
         return float(np.squeeze(heat.body_capacity / (heat.conductance + heat.body_loss)))
 
+    @door
     def rest(self, memory: float = 0.0) -> ModuleState:
         """Cold and unloaded, in the memorised shape [rad]."""
         heater = HeaterState.rest(self.heater, (1,))
@@ -116,14 +120,17 @@ class LumpedModule:
             damage=Damage(flags, flags, flags),
         )  # fmt: skip
 
-    def tca_length(self, angle: Array) -> Array:
+    @door
+    def tca_length(self, angle: Numbers) -> Array:
         """Length of the TCA at an angle, both legs on the inner side, shape (1,) [m]."""
         return 2.0 * (self.spine.length - self.spine.tca_offset * angle)
 
+    @door
     def resistance(self, state: ModuleState) -> float:
         """Resistance of the TCA, from which the angle is sensed [ohm]."""
         return float(self.bank.resistance(state.tca, self.tca_length(state.angle))[0])
 
+    @door
     def step(
         self, state: ModuleState, heater_voltage: float, tca_power: float, fan: bool, dt: float,
         moment: float = 0.0,
@@ -140,6 +147,7 @@ class LumpedModule:
 
         Raises:
             ValueError: If an input is out of range.
+            TcaMelted: If the TCA would be hotter than its fibre melts at.
             ModuleSolveError: If no balance is found.
         """
         heater = heat_spine(self.heater, state.heater, heater_voltage, fan, dt)

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.special import expit
 
-from tca_mj.checks import Array, Checked, Finite, Positive, number, require_positive, within
+from tca_mj.checks import Array, Checked, Finite, Positive, door, number, require_positive, within
 from tca_mj.hints import Length, Modulus, Section, modulus
 
 # Above 110 °C the modulus is below this, Sun, dissertation, Colorado State University, 6.1.3 [Pa].
@@ -154,10 +154,12 @@ class SpineSpec(Checked):
         """Diameter of the cylinder with the module's perimeter, for the air round it [m]."""
         return 2.0 * (self.width + self.module_height) / math.pi
 
+    @door
     def bending(self, temperature: ArrayLike) -> Array:
         """Bending stiffness E(T) I, any shape [N m²]."""
         return self.smp.modulus(temperature) * self.second_moment
 
+    @door
     def largest_modulus(self, angle: float, tension: float) -> float:
         """Modulus at which two legs of TCA still bend the spine by an angle: 2 F a L/(θ I) [Pa].
 
@@ -174,6 +176,7 @@ class SpineSpec(Checked):
         require_positive(angle=angle, tension=tension)
         return 2.0 * tension * self.tca_offset * self.length / (angle * self.second_moment)
 
+    @door
     def sag(self, weight: float, temperature: ArrayLike) -> Array:
         """Turn of the tip of the straight, horizontal spine under a weight: F L²/(2 E I) [rad].
 

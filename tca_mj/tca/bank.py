@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tca_mj.checks import Array, floats, within
+from tca_mj.checks import Array, door, floats, instance, shown, within
 from tca_mj.tca.arrays import column, frozen
 from tca_mj.tca.laws.law import LawChoice, TensionLaw
 from tca_mj.tca.laws.rod import CoilRods
@@ -92,7 +92,7 @@ class Pull:
 
     def at(self, length: ArrayLike) -> Array:
         """Tension F(l) of the affine law, not clipped, shape (..., n) [N]."""
-        return self.tension + self.stiffness * (np.asarray(length) - self.length)
+        return self.tension + self.stiffness * (within("length", length) - self.length)
 
 
 class TcaBank:
@@ -127,6 +127,7 @@ class TcaBank:
 
     kind = "TCA"
 
+    @door
     def __init__(self, specs: Sequence[TcaSpec], law: LawChoice = "rod") -> None:
         """Gathers the constants of ``specs``, and their surfaces if ``law`` needs them.
 
@@ -146,6 +147,9 @@ class TcaBank:
             raise ValueError(f"law must be 'rod' or 'surface', got {law!r}")
         self.law = law
         self._coils = (law if callable(law) else _LAWS[law])(self.specs)
+        for name in ("shortest", "longest", "tension"):
+            if not hasattr(self._coils, name):
+                raise ValueError(f"law must make a TensionLaw with {name}, got {shown(law)}")
         self._wire = WireTable.of(self.specs)
         self.heat = heat_of(self.specs)
         self.supply = Supply()
@@ -169,12 +173,14 @@ class TcaBank:
 
     def signals(self, state: TcaState, length: ArrayLike) -> dict[str, Signal]:
         """What TCAs show besides length and tension."""
+        instance("state", state, TcaState)
         return {
             "temperature": Signal("°C", state.temperature),
             "body temperature": Signal("°C", state.body),
             "resistance": Signal("ohm", self.resistance(state, length, strict=False)),
         }
 
+    @door
     def rest(self, batch_shape: tuple[int, ...] = ()) -> TcaState:
         """The state at ambient temperature with no energy counted, shape batch_shape + (n,)."""
         shape = (*batch_shape, self.n)
@@ -197,15 +203,16 @@ class TcaBank:
         Raises:
             ValueError: If the shape is wrong or a temperature is below that of the surroundings.
         """
-        temperature = np.array(floats("temperature", temperature))
+        temperature = np.array(within("temperature", temperature))
         if temperature.shape[-1:] != (self.n,):
             raise ValueError(
                 f"temperature must have shape (..., {self.n}), got {temperature.shape}"
             )
         ambient = self.heat.ambient
-        if not (np.isfinite(temperature) & (temperature >= ambient)).all():
+        if not (temperature >= ambient).all():
             raise ValueError(
-                f"temperature must be finite and at least {ambient}, got {temperature}"
+                f"temperature must be at least that of the surroundings, {ambient} °C,"
+                f" got {temperature}"
             )
         state = replace(
             self.rest(temperature.shape[:-1]),
@@ -258,7 +265,8 @@ class TcaBank:
         )  # fmt: skip
         within("power", power, at_least=0.0, unit="W")
         step = self._heating
-        if step is None or step.heat is not self.heat or step.dt != dt:
+        known = step is not None and step.heat is self.heat and isinstance(dt, float | int)
+        if step is None or not (known and step.dt == dt):
             step = self._heating = HeatStep.of(self.heat, dt)
         temperature, body, lost = step.advance(state.temperature, state.body, power)
         molten = temperature > self.melting_temperature
@@ -287,19 +295,23 @@ class TcaBank:
 
     def energy_stored(self, state: TcaState) -> Array:
         """Heat stored above ambient in TCAs and their bodies, shape (..., n) [J]."""
+        instance("state", state, TcaState)
         heat = self.heat
         own = heat.capacity * (state.temperature - heat.ambient)
         return own + heat.body_capacity * (state.body - heat.ambient)
 
     def overheated(self, state: TcaState) -> NDArray[np.bool_]:
         """Whether a TCA is above ``max_temperature``, where the laws extrapolate, (..., n)."""
+        instance("state", state, TcaState)
         return state.temperature > self.max_temperature
 
     def broken(self, pull: Pull) -> NDArray[np.bool_]:
         """Whether a tension is above ``breaking_force``, shape (..., n); nothing is clipped."""
+        instance("pull", pull, Pull)
         return pull.tension > self.breaking_force
 
     def _checked(self, state: TcaState, name: str, values: ArrayLike) -> Array:
+        instance("state", state, TcaState)
         values = floats(name, values)
         shape = state.temperature.shape
         if not shape or shape[-1] != self.n:

@@ -22,7 +22,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from tca_mj.checks import number, require_positive
+from tca_mj.checks import door, number, require_positive
 from tca_mj.tca.spec import TcaSpec
 from tca_mj.tca.thermal import BodyHeat
 
@@ -40,6 +40,7 @@ BODY_TO_AIR = 15.0
 CHANNEL_CONTACT = 0.415
 
 
+@door
 def silicone_body(
     tca: TcaSpec, *, section: float, perimeter: float, touching: float = 0.0
 ) -> BodyHeat:
@@ -67,6 +68,7 @@ def silicone_body(
     )
 
 
+@door
 def in_silicone(
     tca: TcaSpec, *, section: float, perimeter: float, touching: float = 0.0
 ) -> TcaSpec:
@@ -82,6 +84,7 @@ def in_silicone(
     return replace(tca, body=body)
 
 
+@door
 def ring_conductance(inner: float, outer: float) -> float:
     """From the inner surface of a ring of silicone to its mean temperature, per length [W/(m K)].
 

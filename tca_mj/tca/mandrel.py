@@ -3,7 +3,12 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 from itertools import pairwise
+from typing import Annotated
+
+from tca_mj.checks import door
+from tca_mj.hints import angle
 
 # Sun, dissertation, Colorado State University, Section 2.1.1: annealed at the Brill transition of
 # nylon 6,6 or below, a coil closes off its mandrel; annealed at 200 °C it "can almost maintain
@@ -17,8 +22,12 @@ _FLATTER = 15.57  # [°]
 _KEPT = 0.752
 _KEPT_SLOPE = -0.0207  # [1/°]
 
+Pitch = Annotated[float, partial(angle, below=0.5 * math.pi)]
+"""A pitch angle, of a groove or a coil."""
 
-def kept_share(groove_pitch_angle: float, annealing_temperature: float) -> float:
+
+@door
+def kept_share(groove_pitch_angle: Pitch, annealing_temperature: float) -> float:
     """Share of the gap between the coils that a TCA keeps when it creeps to its natural length.
 
     Natural length = contact length + share (made length - contact length). Piecewise linear in

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tca_mj.checks import Array, floats, within
+from tca_mj.checks import Array, door, floats, within
 from tca_mj.tca.arrays import column, frozen
 from tca_mj.tca.spec import FibreSpec
 
@@ -39,6 +39,7 @@ class FibreTable(NamedTuple):
     load_softening: tuple[Array, Array, Array]
 
     @classmethod
+    @door
     def of(cls, fibres: Sequence[FibreSpec]) -> FibreTable:
         """Collects the numbers of ``fibres``, in their order."""
         columns = [column(fibres, name) for name in cls._fields]
@@ -50,6 +51,7 @@ Fibres = FibreSpec | FibreTable
 _LEFT = "share of the modulus left at this temperature"
 
 
+@door
 def radial_growth(fibre: Fibres, temperature: ArrayLike) -> Array:
     """Relative growth of the fibre's radius, Gamma(T)/Gamma(T_0) - 1.
 
@@ -73,6 +75,7 @@ def radial_growth(fibre: Fibres, temperature: ArrayLike) -> Array:
         return within("radial growth at this temperature", rise * (a1 + a2 * rise))
 
 
+@door
 def untwist(fibre: Fibres, temperature: ArrayLike) -> Array:
     """Twist lost by heating, inserted_twist (1/Gamma - 1), Sun, eq. (3.4).
 
@@ -93,6 +96,7 @@ def untwist(fibre: Fibres, temperature: ArrayLike) -> Array:
     return -twist * (growth / (1.0 + growth))
 
 
+@door
 def softening(fibre: Fibres, temperature: ArrayLike, torsion: ArrayLike = 0.0) -> Array:
     """Share e of the moduli that is left, E_f/E_f0 of Sun, eq. (3.11).
 
@@ -123,6 +127,7 @@ def softening(fibre: Fibres, temperature: ArrayLike, torsion: ArrayLike = 0.0) -
     return within(_LEFT, left, above=0.0)
 
 
+@door
 def softened_tension(
     fibre: Fibres, temperature: ArrayLike, stiff: ArrayLike, torsion_per_tension: ArrayLike
 ) -> tuple[Array, Array]:

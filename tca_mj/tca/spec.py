@@ -14,7 +14,7 @@ from dataclasses import dataclass, fields, replace
 from functools import partial
 from typing import Annotated, Literal
 
-from tca_mj.checks import Checked, NotNegative, Positive, Temperature, Triple, number, within
+from tca_mj.checks import Checked, NotNegative, Positive, Temperature, Triple, door, number, within
 from tca_mj.hints import angle, modulus, size
 from tca_mj.tca.arrays import column
 from tca_mj.tca.mandrel import BRILL_TRANSITION, kept_share
@@ -188,12 +188,11 @@ class TcaSpec(Checked):
         Checked.__post_init__(self)
         number("coil_radius (spring index above 1)", self.coil_radius, above=self.fibre.radius)
         angle("minimum_pitch_angle", self.minimum_pitch_angle, below=self.pitch_angle)
-        if not isinstance(self.body, BodyHeat | None):
-            raise ValueError(f"body must be a BodyHeat or None, got {self.body!r}")
         stretch = max(1.0 / math.sin(self.pitch_angle) - 1.0, 1e-300)  # there no resistance is left
         number("stretch_resistance", self.stretch_resistance, at_least=0.0, below=1.0 / stretch)
 
     @classmethod
+    @door
     def from_mandrel(
         cls,
         *,
@@ -293,11 +292,13 @@ class TcaSpec(Checked):
             body_loss=body.loss * length,
         )  # fmt: skip
 
+    @door
     def of_length(self, rest_length: float) -> TcaSpec:
         """A piece of the same coil (in the same body) with another natural length [m]."""
         _length("rest_length", rest_length)
         return replace(self, fibre_length=rest_length / self.rest_length * self.fibre_length)
 
+    @door
     def of_pitch(self, pitch_angle: float) -> TcaSpec:
         """The same coil crept to another natural pitch angle [rad]; it keeps its turns.
 

@@ -52,11 +52,20 @@ class Thermostat(Checked):
             temperature: Temperatures, shape (..., n) [°C].
             target: Wanted ones, same shape [°C].
             body: Temperatures of what they lie in, same shape; None if that is cold [°C].
+
+        Raises:
+            ValueError: If a temperature is not finite.
         """
-        goal = np.minimum(np.asarray(target, dtype=np.float64), self.max_temperature)
-        error = goal - np.asarray(temperature, dtype=np.float64)
-        steady = self.heat.keeping(goal, self.heat.ambient if body is None else body)
-        return np.clip(steady + self.heat.capacity * error / self.response, 0.0, self.max_power)
+        return self._power(
+            within("temperature", temperature), within("target", target),
+            self.heat.ambient if body is None else within("body", body),
+        )  # fmt: skip
+
+    def _power(self, temperature: Array, target: Array, body: float | Array) -> Array:
+        goal = np.minimum(target, self.max_temperature)
+        heat, error = self.heat, goal - temperature
+        steady = heat.loss * (goal - heat.ambient) + heat.conductance * (goal - body)
+        return np.clip(steady + heat.capacity * error / self.response, 0.0, self.max_power)
 
 
 @dataclass(frozen=True, kw_only=True, slots=True, eq=False)
@@ -128,7 +137,7 @@ class Supply(Checked):
         power = command
         if quantity == "temperature":
             assert self.thermostat is not None
-            held = self.thermostat.power(temperature, command, body)
+            held = self.thermostat._power(temperature, command, body)
             power = np.where(command > self.thermostat.heat.ambient, held, 0.0)
         if limited or quantity in ("voltage", "current"):
             ohms = resistance()

@@ -25,7 +25,8 @@ from tca_mj.checks import (
     NotNegatives,
     Positive,
     Positives,
-    floats,
+    door,
+    instance,
     number,
     numbers,
     within,
@@ -72,33 +73,43 @@ class HeatSpec(Checked):
         through = self.conductance * self.body_loss / np.where(series > 0.0, series, 1.0)
         return self.loss + through
 
+    @door
     def steady_body(self, temperature: ArrayLike) -> Array:
         """Temperature of the body once TCAs have been at ``temperature`` for long, (..., n) [°C].
 
         The body of a bare TCA has that of the surroundings, one without loss that of the TCA.
+
+        Raises:
+            ValueError: If a temperature is not finite.
         """
         series = np.asarray(self.conductance + self.body_loss)
         share = self.conductance / np.where(series > 0.0, series, 1.0)
-        return self.ambient + share * (floats("temperature", temperature) - self.ambient)
+        return self.ambient + share * (within("temperature", temperature) - self.ambient)
 
     def body_after(self, body: ArrayLike, temperature: ArrayLike, dt: float) -> Array:
         """Temperature of bodies after ``dt`` with their TCAs at ``temperature``, (..., n) [°C].
 
         Whoever sees the TCAs alone can so follow what they lie in. That of a bare TCA stays.
+
+        Raises:
+            ValueError: If a temperature is not finite, or ``dt`` negative or not finite.
         """
         series = np.asarray(self.conductance + self.body_loss)
         rate = np.where(np.asarray(self.conductance) > 0.0, series / self.body_capacity, 0.0)
-        now = floats("body", body)
-        return now - (self.steady_body(temperature) - now) * np.expm1(-rate * dt)
+        now, time = within("body", body), number("dt", dt, at_least=0.0, unit="s")
+        return now - (self.steady_body(temperature) - now) * np.expm1(-rate * time)
 
     def keeping(self, temperature: ArrayLike, body: ArrayLike) -> Array:
         """Power that keeps TCAs at ``temperature`` while the body has ``body``, (..., n) [W].
 
         It is negative where the surroundings are hotter than the TCA.
+
+        Raises:
+            ValueError: If a temperature is not finite.
         """
-        temperature = floats("temperature", temperature)
+        temperature = within("temperature", temperature)
         to_air = self.loss * (temperature - self.ambient)
-        return to_air + self.conductance * (temperature - floats("body", body))
+        return to_air + self.conductance * (temperature - within("body", body))
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -156,6 +167,7 @@ class HeatStep(NamedTuple):
             ValueError: If ``dt`` is negative or not finite.
         """
         number("dt", dt, at_least=0.0, unit="s")
+        instance("heat", heat, HeatSpec)
         capacity, body = np.asarray(heat.capacity), np.asarray(heat.body_capacity)
         loss, out, through = heat.loss, heat.body_loss, heat.conductance
         first, second = (loss + through) / capacity, (out + through) / body
@@ -226,6 +238,7 @@ def _second_integral(rate: Array, dt: float) -> Array:
     return np.where(z < 5e-3, series * dt * dt, (dt - _integral(rate, dt)) / safe)
 
 
+@door
 def step_temperature(temperature: ArrayLike, power: ArrayLike, heat: HeatSpec, dt: float) -> Array:
     """Advances the temperature of what is bare by ``dt`` under constant power, exactly.
 
@@ -249,6 +262,7 @@ def step_temperature(temperature: ArrayLike, power: ArrayLike, heat: HeatSpec, d
     return _bare(temperature, power, heat, dt)[0]
 
 
+@door
 def heat_lost(temperature: ArrayLike, power: ArrayLike, heat: HeatSpec, dt: float) -> Array:
     """Heat given to the surroundings during a step, ∫ λ (T - T_amb) dt, exactly.
 

@@ -12,10 +12,10 @@ from dataclasses import fields
 import numpy as np
 from scipy.linalg import solve_banded
 
-from tca_mj.checks import Array
+from tca_mj.checks import Array, Positive, door
 from tca_mj.rod.solving import band_matrix
 from tca_mj.tca.dynamics.loads import Course, Heating, LoadState
-from tca_mj.tca.dynamics.stepping import LoadedTcas
+from tca_mj.tca.dynamics.stepping import LoadedTcas, Steps
 
 _NAMES = tuple(field.name for field in fields(LoadState))
 _WINDOW = 1000  # steps that ``solve`` takes at once
@@ -25,8 +25,9 @@ _COURSE_ACCEPTED = 1e-10  # last correction of its lengths [m]
 _WARMED = 1e-8  # last correction of its temperatures [K]
 
 
+@door
 def solve_course(
-    tcas: LoadedTcas, state: LoadState, heating: Heating, dt: float, steps: int
+    tcas: LoadedTcas, state: LoadState, heating: Heating, dt: Positive, steps: Steps
 ) -> Course:
     """Dynamic motion as ``LoadedTcas.simulate``, all steps at once: for few TCAs much faster.
 
@@ -39,7 +40,7 @@ def solve_course(
         state: State at time 0, shape (..., n).
         heating: Held throughout; ``value`` and ``air`` broadcast with (..., n).
         dt: Length of a step, above 0 [s].
-        steps: Number of steps, not negative.
+        steps: Number of steps, 0 to 500 000.
 
     Returns:
         ``steps + 1`` states.

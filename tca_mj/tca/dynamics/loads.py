@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tca_mj.checks import Array, Checked, NotNegatives, Positives, floats, within
+from tca_mj.checks import Array, Checked, NotNegatives, Positive, Positives, door, numbers, within
 
 Source = Literal["power", "voltage", "current"]
 
@@ -35,12 +35,14 @@ class Load(Checked):
     damping: NotNegatives = 0.0
 
     @classmethod
-    def weight(cls, mass: float | Array, damping: float | Array = 0.0) -> Load:
+    @door
+    def weight(cls, mass: NotNegatives, damping: NotNegatives = 0.0) -> Load:
         """A hanging mass [kg]."""
         weight = within("mass", mass, at_least=0.0, unit="kg") * GRAVITY
         return cls(force=weight, mass=mass, damping=damping)
 
     @classmethod
+    @door
     def spring(
         cls,
         stiffness: float | Array,
@@ -74,7 +76,7 @@ class Heating(Checked):
     """
 
     source: Source = "power"
-    value: float | Array = 0.0
+    value: Annotated[float | Array, numbers] = 0.0
     air: Positives = 1.0
 
     def __post_init__(self) -> None:
@@ -83,7 +85,7 @@ class Heating(Checked):
 
     def power(self, resistance: ArrayLike) -> Array:
         """Joule heat in given resistances, the broadcast shape [W]."""
-        ohms = floats("resistance", resistance)
+        ohms = within("resistance", resistance, above=0.0, unit="ohm")
         if self.source == "voltage":
             return np.square(self.value) / ohms
         if self.source == "current":
@@ -119,7 +121,8 @@ class Course(LoadState):
     time: Array
 
     @classmethod
-    def of(cls, states: LoadState, dt: float) -> Course:
+    @door
+    def of(cls, states: LoadState, dt: Positive) -> Course:
         """States ``dt`` apart, (k, ..., n)."""
         time = dt * np.arange(len(states.length), dtype=np.float64)
         return cls(states.length, states.velocity, states.temperature, states.power, time)

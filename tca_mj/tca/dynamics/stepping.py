@@ -23,13 +23,22 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import astuple
 from functools import partial
-from typing import Literal, get_args
+from typing import Annotated, Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tca_mj.checks import Array, floats, require_one_of, require_positive, within
-from tca_mj.tca.arrays import stacked
+from tca_mj.checks import (
+    Array,
+    Positive,
+    door,
+    instance,
+    require_one_of,
+    require_positive,
+    whole,
+    within,
+)
+from tca_mj.tca.arrays import column, stacked
 from tca_mj.tca.dynamics.loads import Course, Heating, Load, LoadState
 from tca_mj.tca.laws.rod import CoilRods, require_domain
 from tca_mj.tca.sensing import wire
@@ -41,6 +50,8 @@ LengthLaw = Callable[[Array, Array], tuple[Array, Array]]
 ResistanceLaw = Callable[[Array, Array], Array]
 """(length, temperature), each (..., n) -> resistance [ohm]."""
 Motion = Literal["dynamic", "quasistatic"]
+Steps = Annotated[int, partial(whole, at_least=0, at_most=500_000)]
+"""Steps of one course. Each costs some 0.1 ms, and its state is kept."""
 
 # A correction of Newton's method at which the next one is not made: it would be below 1e-8 m
 # even where the turns start to touch at steps of 0.05 s, and below 1e-11 m at 1 ms.
@@ -81,6 +92,7 @@ class LoadedTcas:
         longest: Longest one, shape (n,) [m].
     """
 
+    @door
     def __init__(
         self,
         specs: Sequence[TcaSpec],
@@ -109,9 +121,11 @@ class LoadedTcas:
         self.shortest, self.longest = rods.shortest, rods.longest
         self._law: LengthLaw = rods.tension if law is None else law
         self._resistance = resistance or partial(wire.resistance, wire.WireTable.of(self.specs))
+        self._rest_length = column(self.specs, "rest_length")
         self.heat = heat_of(self.specs)
         require_bare(self.heat)
 
+    @door
     def rest(self, batch_shape: tuple[int, ...] = ()) -> LoadState:
         """Loaded equilibrium at ambient temperature, shape batch_shape + (n,); errors: ``settle``.
         """
@@ -120,6 +134,7 @@ class LoadedTcas:
         length = self.settle(temperature)
         return LoadState(length, np.zeros_like(length), temperature, np.zeros_like(length))
 
+    @door
     def settle(self, temperature: ArrayLike, guess: ArrayLike | None = None) -> Array:
         """Length at which tension and load balance, the static solution.
 
@@ -134,21 +149,30 @@ class LoadedTcas:
             ValueError: If no length between ``shortest`` and ``longest`` carries the load.
             MotionSolveError: If it is not found, as for a law that does not rise.
         """
-        temperature = floats("temperature", temperature)
-        start = [spec.rest_length for spec in self.specs] if guess is None else guess
+        temperature = self._sized("temperature", temperature)
+        start = self._sized("guess", self._rest_length if guess is None else guess)
         load = self.load
         goal = load.force + load.stiffness * load.reference
         shape = np.broadcast_shapes(temperature.shape, np.shape(goal))
         temperature = np.broadcast_to(temperature, shape)
-        length = np.broadcast_to(np.asarray(start, dtype=np.float64), shape)
+        length = np.broadcast_to(start, shape)
         length = self._balance(length, temperature, 0.0, goal, 1e-9, slack=False)
         self.check_domain(length)
         return length
 
+    def _sized(self, name: str, values: ArrayLike) -> Array:
+        """Finite numbers, shape (..., n)."""
+        array = within(name, values)
+        if array.shape[-1:] != (self.n,):
+            raise ValueError(f"{name} must have shape (..., {self.n}), got {array.shape}")
+        return array
+
+    @door
     def tension(self, state: LoadState) -> Array:
         """Tension that the load feels, not below 0, shape (..., n) [N]."""
         return np.maximum(self._law(state.length, state.temperature)[0], 0.0)
 
+    @door
     def resistance(self, state: LoadState) -> Array:
         """Resistance, shape (..., n) [ohm]."""
         return self._resistance(state.length, state.temperature)
@@ -173,9 +197,11 @@ class LoadedTcas:
             MotionSolveError: As ``settle``.
         """
         require_positive(dt=dt)
+        instance("state", state, LoadState)
+        instance("heating", heating, Heating)
+        require_one_of("motion", motion, get_args(Motion))
         if motion == "quasistatic":
             return self._creep_along(state, heating, dt)
-        require_one_of("motion", motion, get_args(Motion))
         load, half = self.load, 0.5 * dt
         mass = within("mass in dynamic motion", load.mass, above=0.0, unit="kg")
         guess = state.length + half * state.velocity
@@ -192,12 +218,13 @@ class LoadedTcas:
         self.check_domain(end)
         return LoadState(end, 2.0 * velocity - state.velocity, temperature, power)
 
+    @door
     def simulate(
         self,
         state: LoadState,
         heating: Heating | Callable[[float], Heating],
-        dt: float,
-        steps: int,
+        dt: Positive,
+        steps: Steps,
         motion: Motion = "dynamic",
     ) -> Course:
         """Runs ``steps`` steps; arguments and errors as ``step``.
@@ -206,7 +233,7 @@ class LoadedTcas:
             state: State at time 0.
             heating: Held throughout, or a function of the time at the start of a step [s].
             dt: Length of a step [s].
-            steps: Number of steps, not negative.
+            steps: Number of steps, 0 to 500 000: all states are kept.
             motion: As in ``step``.
 
         Returns:

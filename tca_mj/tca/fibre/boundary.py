@@ -11,12 +11,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import NamedTuple
+from functools import partial
+from typing import Annotated, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tca_mj.checks import Array, number, require_count, require_positive, within
+from tca_mj.checks import Array, door, number, require_positive, whole, within
 from tca_mj.rod.deadload.descent import follow
 from tca_mj.rod.deadload.wrench import DeadLoad
 from tca_mj.rod.errors import RodSolveError
@@ -83,6 +84,7 @@ class Stiffness(NamedTuple):
     stretch: float
 
 
+@door
 def fibre_stiffness(fibre: FibreSpec, temperature: float, torsion: float = 0.0) -> Stiffness:
     """Stiffness of the fibre's section: softened, and grown if ``fibre.section`` is "hot".
 
@@ -101,6 +103,7 @@ def fibre_stiffness(fibre: FibreSpec, temperature: float, torsion: float = 0.0) 
     return Stiffness(young * second_moment, 2.0 * shear * second_moment, shear * area, young * area)
 
 
+@door
 def solve_fibre(
     centreline: Centreline,
     fibre: FibreSpec,
@@ -109,7 +112,7 @@ def solve_fibre(
     moment: ArrayLike = (0.0, 0.0, 0.0),
     *,
     tolerance: float = 1e-6,
-    intervals: int | None = None,
+    intervals: Annotated[int, partial(whole, at_least=1, at_most=_FINEST)] | None = None,
 ) -> FibreShape:
     """Shape of a fibre, one end clamped, under heat and a dead load on its other end.
 
@@ -125,7 +128,7 @@ def solve_fibre(
         force: Force at the fibre's end, world frame, shape (3,) [N].
         moment: Moment on the fibre's end, world frame, shape (3,); zero lets it spin [N m].
         tolerance: Allowed error of the end's position over the fibre's length [1].
-        intervals: Solves on one mesh of so many equal intervals, whatever its error. By default
+        intervals: Solves on one mesh of so many equal intervals, at most 50 000. By default
             the mesh is refined until ``tolerance`` is met.
 
     Raises:
@@ -148,7 +151,6 @@ def solve_fibre(
         return mesh.shape(state, residual), state
 
     if intervals is not None:
-        require_count(intervals=intervals)
         coarse = intervals
         return followed(1)[0]
 
@@ -173,8 +175,11 @@ def solve_fibre(
 def _turns(centreline: Centreline, twist: float) -> float:
     """Turns of the heated, unloaded fibre's frame."""
     at = np.linspace(0.0, centreline.length, 257)
-    rate = np.linalg.norm(centreline.strain(at) + [0.0, 0.0, twist], axis=1)
-    return float(np.mean(rate)) * centreline.length / (2.0 * math.pi)
+    strain = within("strain(s)", centreline.strain(at), shape=(257, 3))
+    rate = np.linalg.norm(strain + [0.0, 0.0, twist], axis=1)
+    turns = float(np.mean(rate)) * centreline.length / (2.0 * math.pi)
+    number("turns of the fibre's frame", turns, at_most=_FINEST / _PER_TURN)
+    return turns
 
 
 def _load_torsion(centreline: Centreline, fibre: FibreSpec, force: Array) -> float:

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.interpolate import make_interp_spline
 
-from tca_mj.checks import Array, Checked, Positive, floats, number, require_positive, within
+from tca_mj.checks import Array, Checked, Positive, door, number, require_positive, whole, within
 from tca_mj.quadrature import GaussRule
 from tca_mj.rod.lie import matrix_quaternion, quaternion_exp, quaternion_matrix, running_product
 from tca_mj.tca.catalogue import CATALOGUE
@@ -47,13 +47,14 @@ class Centreline(Checked):
     length: Positive
     strain: Callable[[Array], Array]
     position: Annotated[Array, partial(within, shape=(3,))]
-    rotation: Array
+    rotation: Annotated[Array, partial(within, shape=(3, 3))]
 
     def __post_init__(self) -> None:
         Checked.__post_init__(self)
         matrix_quaternion(self.rotation)
 
     @classmethod
+    @door
     def helix(cls, *, radius: float, pitch_angle: float, length: float) -> Centreline:
         """A right-handed helix that hangs down from z = 0 about the world's z axis.
 
@@ -80,6 +81,7 @@ class Centreline(Checked):
         )
 
     @classmethod
+    @door
     def of_tca(cls, tca: TcaSpec) -> Centreline:
         """The helix of a TCA at its natural length, hanging down."""
         return cls.helix(
@@ -87,16 +89,19 @@ class Centreline(Checked):
         )
 
     @classmethod
+    @door
     def of_curve(
-        cls, position: Callable[[Array], ArrayLike], start: float, end: float, samples: int = 4001
-    ) -> Centreline:
+        cls, position: Callable[[Array], ArrayLike], start: float, end: float,
+        samples: Annotated[int, partial(whole, at_least=6, at_most=500_000)] = 4001,
+    ) -> Centreline:  # fmt: skip
         """Any curve p(t), t from ``start`` to ``end``; t need not be the arc length.
 
         Args:
             position: Parameter, shape (n,), to points, shape (n, 3) [m].
             start: First parameter.
             end: Last parameter.
-            samples: Points at which it is evaluated; 100 on each turn give 1e-8 of the length.
+            samples: Points at which it is evaluated, 6 to 500 000; 100 on each turn give 1e-8 of
+                the length.
 
         Raises:
             ValueError: As ``of_points``.
@@ -105,6 +110,7 @@ class Centreline(Checked):
         return cls.of_points(position(parameter), parameter)
 
     @classmethod
+    @door
     def of_points(cls, points: ArrayLike, parameter: ArrayLike | None = None) -> Centreline:
         """The smooth curve through given points: a spline of degree five.
 
@@ -207,31 +213,31 @@ class ConicalTca(Checked):
 
     def arc_length(self, z: ArrayLike) -> Array:
         """Length of the spiral from the cone's tip to heights z [m]; Sun, eq. (3.37) corrected."""
-        z, a, b = floats("z", z), self.winding, self.slope
+        z, a, b = within("z", z), self.winding, self.slope
         root = np.sqrt(1.0 + b * b * (1.0 + np.square(a * z)))
         length = np.arcsinh(a * b * z / math.sqrt(1.0 + b * b)) * (1.0 + b * b) / (2.0 * a * b)
         return 0.5 * z * root + length
 
     def position(self, z: ArrayLike) -> Array:
         """Points of the spiral at heights z above the cone's tip, shape (..., 3) [m]."""
-        z = floats("z", z)
+        z = within("z", z)
         a, b = self.winding, self.slope
         return np.stack([b * z * np.cos(a * z), b * z * np.sin(a * z), z], axis=-1)
 
     def curvature(self, z: ArrayLike) -> Array:
         """Curvature at heights z [1/m]; Sun, eq. (3.38) corrected."""
-        a, b, az2 = self.winding, self.slope, np.square(self.winding * floats("z", z))
+        a, b, az2 = self.winding, self.slope, np.square(self.winding * within("z", z))
         top = a * b * np.sqrt(4.0 + az2 + np.square(b * (2.0 + az2)))
         return top / (1.0 + b * b * (1.0 + az2)) ** 1.5
 
     def torsion(self, z: ArrayLike) -> Array:
         """Torsion at heights z [rad/m]; Sun, eq. (3.39)."""
-        a, b, az2 = self.winding, self.slope, np.square(self.winding * floats("z", z))
+        a, b, az2 = self.winding, self.slope, np.square(self.winding * within("z", z))
         return a * (6.0 + az2) / (4.0 + az2 + np.square(b * (2.0 + az2)))
 
     def height(self, s: ArrayLike) -> Array:
         """Heights z at arc lengths s from the fibre's start [m]: arc_length(z) inverted."""
-        goal = floats("s", s) + self.arc_length(self.start)
+        goal = within("s", s) + self.arc_length(self.start)
         a, b = self.winding, self.slope
         z = goal / math.sqrt(1.0 + b * b)  # too large: arc_length is convex, Newton falls to it
         for _ in range(_NEWTON_STEPS):

@@ -32,7 +32,19 @@ from typing import Annotated
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tca_mj.checks import Array, Checked, NotNegative, Positive, Temperature, floats, number, within
+from tca_mj.checks import (
+    Array,
+    Checked,
+    NotNegative,
+    Positive,
+    Temperature,
+    Temperatures,
+    door,
+    floats,
+    number,
+    whole,
+    within,
+)
 from tca_mj.tca.arrays import column
 from tca_mj.tca.laws.rod import CoilRods
 from tca_mj.tca.spec import TcaSpec
@@ -92,6 +104,7 @@ class CreepBank:
         n: Number of TCAs.
     """
 
+    @door
     def __init__(self, specs: Sequence[TcaSpec], creep: CreepSpec | None = None) -> None:
         """Gathers the constants.
 
@@ -111,10 +124,12 @@ class CreepBank:
         self._rest = column(self.specs, "rest_length")
         self._fibre_length = column(self.specs, "fibre_length")
 
+    @door
     def rest(self, batch_shape: tuple[int, ...] = ()) -> CreepState:
         """The state after training: natural lengths, shape batch_shape + (n,)."""
         return CreepState(np.zeros((*batch_shape, self.n)))
 
+    @door
     def fresh(self, length: ArrayLike) -> CreepState:
         """The state of unloaded TCAs that have a temporary length, as right after fabrication.
 
@@ -131,6 +146,7 @@ class CreepBank:
             )
         return CreepState(length - self._rest)
 
+    @door
     def settled(self, tension: ArrayLike) -> Array:
         """Shift after a long time under a tension, shape (..., n) [N] -> [m].
 
@@ -142,6 +158,7 @@ class CreepBank:
         share = stretch / (stretch + self.creep.half_stretch)
         return self._fibre_length * self.creep.saturation * share
 
+    @door
     def step(
         self, state: CreepState, tension: ArrayLike, temperature: ArrayLike, dt: float
     ) -> CreepState:
@@ -166,28 +183,31 @@ class CreepBank:
         done = -np.expm1(-dt / relaxation_time(temperature, self.creep))
         return CreepState(state.shift + done * (settled - state.shift))
 
+    @door
     def cycle(
         self,
         state: CreepState,
         tension: ArrayLike,
         *,
-        cycles: int = 1,
-        hot: ArrayLike = 150.0,
-        hot_time: float = 4.0,
-        cold: ArrayLike = 25.0,
-        cold_time: float = 100.0,
+        cycles: Annotated[int, partial(whole, at_least=0, at_most=100_000)] = 1,
+        hot: Temperatures = 150.0,
+        hot_time: NotNegative = 4.0,
+        cold: Temperatures = 25.0,
+        cold_time: NotNegative = 100.0,
     ) -> CreepState:
         """Heating cycles: ``hot_time`` hot, then ``cold_time`` cold, at one tension.
 
         A TCA is trained by 10 of them without load (Sun, Section 2.2.2), and one of them brings it
         near the equilibrium under a new load. The times hot and cold are estimates, except for
-        the 100 s. Arguments and errors otherwise as ``step``.
+        the 100 s. Arguments and errors otherwise as ``step``; ``cycles`` are at most 100 000, ten
+        times those of the published ageing.
         """
         for _ in range(cycles):
             state = self.step(state, tension, hot, hot_time)
             state = self.step(state, tension, cold, cold_time)
         return state
 
+    @door
     def crept(self, state: CreepState) -> tuple[TcaSpec, ...]:
         """The TCAs with their crept natural lengths, turns and contact lengths kept.
 
@@ -206,6 +226,7 @@ class CreepBank:
         )
 
 
+@door
 def relaxation_time(temperature: ArrayLike, creep: CreepSpec) -> Array:
     """Time constant of creep and of recovery, Arrhenius' law.
 
@@ -226,6 +247,7 @@ def relaxation_time(temperature: ArrayLike, creep: CreepSpec) -> Array:
         return creep.room_time * np.exp(exponent)
 
 
+@door
 def hysteresis_damping(tca: TcaSpec, creep: CreepSpec) -> float:
     """Damping b that makes a stroke lag: ``creep.lag`` times the cold stiffness [N s/m].
 
@@ -239,6 +261,7 @@ def hysteresis_damping(tca: TcaSpec, creep: CreepSpec) -> float:
     return creep.lag * float(CoilRods([tca]).rest_stiffness[0])
 
 
+@door
 def aged(tca: TcaSpec, cycles: float, creep: CreepSpec) -> TcaSpec:
     """The TCA after a number of cycles: it untwists less.
 

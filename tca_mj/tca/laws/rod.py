@@ -40,7 +40,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tca_mj.checks import Array, floats, within
+from tca_mj.checks import Array, door, floats, within
 from tca_mj.tca.arrays import column, frozen
 from tca_mj.tca.laws.roots import TOLERANCE, bracketed
 from tca_mj.tca.moduli import FibreTable, radial_growth, softened, softening, untwist
@@ -102,6 +102,7 @@ class CoilRods:
         contact_stiffness: Stiffness of the coils pressed together, shape (n,) [N/m].
     """
 
+    @door
     def __init__(self, specs: Sequence[TcaSpec]) -> None:
         """Gathers the constants.
 
@@ -280,6 +281,7 @@ class CoilRods:
         return stiffness * (0.5 * onset * share + beyond), stiffness * share
 
 
+@door
 def coil_tension(spec: TcaSpec, length: ArrayLike, temperature: ArrayLike) -> tuple[Array, Array]:
     """Tension of one TCA, both ends glued, and its slope.
 

@@ -32,7 +32,7 @@ from typing import get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tca_mj.checks import Array, require_one_of, within
+from tca_mj.checks import Array, door, require_one_of, within
 from tca_mj.tca.laws.castigliano import Scheme
 from tca_mj.tca.laws.coil import Spin
 from tca_mj.tca.laws.model import CoilModel, Model
@@ -41,6 +41,7 @@ from tca_mj.tca.spec import TcaSpec
 _CHUNK = 4096  # elements solved at a time: what fits into a processor's cache
 
 
+@door
 def hanging_length(
     tca: TcaSpec,
     temperature: ArrayLike,
@@ -75,6 +76,7 @@ def hanging_length(
     return length
 
 
+@door
 def tension(
     tca: TcaSpec,
     length: ArrayLike,
@@ -114,6 +116,7 @@ def tension(
     return force, stiffness
 
 
+@door
 def law_at(
     tca: TcaSpec,
     temperature: float,

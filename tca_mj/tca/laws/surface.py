@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tca_mj.checks import Array, floats
+from tca_mj.checks import Array, door, floats
 from tca_mj.tca.arrays import column
 from tca_mj.tca.laws.rod import CoilRods
 from tca_mj.tca.laws.table import calibrate, evaluate
@@ -30,6 +30,7 @@ class CoilSurfaces:
         hottest: Highest temperature in the tables, shape (n,) [°C].
     """
 
+    @door
     def __init__(self, specs: Sequence[TcaSpec]) -> None:
         """Calibrates the coils that have not been yet.
 

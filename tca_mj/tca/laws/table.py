@@ -20,7 +20,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from tca_mj.checks import Array
+from tca_mj.checks import Array, door
 from tca_mj.tca.arrays import frozen
 from tca_mj.tca.laws.rod import CoilRods
 from tca_mj.tca.moduli import radial_growth, softened
@@ -122,6 +122,7 @@ class Surface:
         return bool(min(c.min() for c in (one, one + 0.5 * v, one + v + v2)) > 0.0)
 
 
+@door
 def calibrate(tca: TcaSpec) -> Surface:
     """The surface of a TCA's coil, made once.
 

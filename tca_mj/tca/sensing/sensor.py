@@ -9,7 +9,17 @@ from typing import Annotated
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tca_mj.checks import Array, Checked, NotNegative, Positive, number, require_count, within
+from tca_mj.checks import (
+    Array,
+    Checked,
+    NotNegative,
+    Numbers,
+    Positive,
+    door,
+    number,
+    whole,
+    within,
+)
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -31,6 +41,7 @@ class CurrentSensor(Checked):
     pulse_frequency: Positive = 4e3
 
 
+@door
 def measured(
     resistance: ArrayLike,
     voltage: ArrayLike,
@@ -74,6 +85,7 @@ def measured(
     return duty * voltage / current
 
 
+@door
 def pulse_mean(duty: ArrayLike, periods: ArrayLike, phase: ArrayLike = 0.0) -> Array:
     """Share of a window in which a pulsed voltage is on, exactly.
 
@@ -101,6 +113,7 @@ def pulse_mean(duty: ArrayLike, periods: ArrayLike, phase: ArrayLike = 0.0) -> A
     return (on_until(phase + periods) - on_until(phase)) / periods
 
 
+@door
 def pulse_power(voltage: ArrayLike, duty: ArrayLike, resistance: ArrayLike) -> Array:
     """Mean power of a pulsed voltage, duty V^2/R and not (duty V)^2/R, broadcast [W].
 
@@ -116,7 +129,11 @@ def pulse_power(voltage: ArrayLike, duty: ArrayLike, resistance: ArrayLike) -> A
     return duty * voltage * voltage / within("resistance", resistance, above=0.0, unit="ohm")
 
 
-def moving_average(values: ArrayLike, count: int, start: ArrayLike | None = None) -> Array:
+@door
+def moving_average(
+    values: Numbers, count: Annotated[int, partial(whole, at_least=1, at_most=10**9)],
+    start: ArrayLike | None = None,
+) -> Array:  # fmt: skip
     """Modified moving average over axis 0, the filter of Sun, Section 2.3.2.
 
     y += (x - y)/count: white noise leaves with 1/sqrt(2 count - 1) of its deviation, a step
@@ -124,21 +141,23 @@ def moving_average(values: ArrayLike, count: int, start: ArrayLike | None = None
 
     Args:
         values: Samples, shape (k, ...) [any unit].
-        count: Number of samples it stands for, at least 1.
+        count: Number of samples it stands for, 1 to a thousand million.
         start: Average before the first sample [the same unit]; None is the first sample itself.
 
     Returns:
         Averages, same shape [the same unit].
 
     Raises:
-        ValueError: If ``count`` is below 1, there is no axis, or a sample is not finite.
+        ValueError: If ``count`` is out of range, there is no axis, a sample is not finite, or
+            ``start`` has another shape than one.
     """
-    require_count(count=count)
     values = within("values", values)
     if values.ndim == 0:
         raise ValueError(f"values must have an axis of samples, got {values}")
     averages = np.empty_like(values)
     average = values[:1].sum(axis=0) if start is None else within("start", start)
+    if average.shape not in ((), values.shape[1:]):
+        raise ValueError(f"start must have the shape {values.shape[1:]}, got {average.shape}")
     for i, value in enumerate(values):
         average = average + (value - average) / count
         averages[i] = average

@@ -29,7 +29,18 @@ import numpy as np
 from numpy.polynomial import Polynomial
 from numpy.typing import ArrayLike
 
-from tca_mj.checks import Array, Checked, Finite, NotNegative, floats, number, within
+from tca_mj.checks import (
+    Array,
+    Checked,
+    Finite,
+    NotNegative,
+    Numbers,
+    door,
+    floats,
+    instance,
+    whole,
+    within,
+)
 from tca_mj.tca.arrays import column
 from tca_mj.tca.spec import TcaSpec
 
@@ -50,6 +61,7 @@ class WireTable(NamedTuple):
     contraction: Array
 
     @classmethod
+    @door
     def of(cls, specs: Sequence[TcaSpec]) -> WireTable:
         """Collects the numbers of ``specs``, in their order."""
         rest_length = column(specs, "rest_length")
@@ -78,6 +90,7 @@ def resistance(
         ValueError: If ``strict`` and a length is not positive and finite or so long that no
             resistance would be left, or if a temperature is not finite.
     """
+    instance("wire", wire, WireTable)
     if strict:
         within("temperature", temperature)
         within("length", length, above=0.0, unit="m")
@@ -92,6 +105,7 @@ def resistance(
     return wire.rest_resistance * left
 
 
+@door
 def sensed_length(wire: WireTable, resistance: ArrayLike) -> Array:
     """Length at which n TCAs have a given resistance: the inverse of ``resistance``.
 
@@ -131,6 +145,7 @@ class SensingSpec(Checked):
     reference_temperature: Finite = 25.0
 
 
+@door
 def resistance_displacement(
     wire: WireTable,
     displacement: ArrayLike,
@@ -191,8 +206,9 @@ class DisplacementFit:
         return np.asarray(self.polynomial(within("resistance", resistance)))
 
 
+@door
 def fit_displacement(
-    resistance: ArrayLike, displacement: ArrayLike, degree: int = 3
+    resistance: Numbers, displacement: ArrayLike, degree: int = 3
 ) -> DisplacementFit:
     """Fits D(R) of one TCA by least squares, Sun, Section 2.3.2: a polynomial of third order.
 
@@ -208,9 +224,10 @@ def fit_displacement(
         ValueError: If shapes differ, a number is not finite, or there are not more different
             resistances than ``degree``.
     """
-    resistance = within("resistance", resistance, shape=(np.size(resistance),))
+    if resistance.ndim != 1:
+        raise ValueError(f"resistance must have shape (k,), got {resistance.shape}")
     displacement = within("displacement", displacement, shape=resistance.shape)
-    number("degree", degree, at_least=0, below=np.unique(resistance).size)
+    whole("degree", degree, at_least=0, at_most=np.unique(resistance).size - 1)
     polynomial = Polynomial.fit(resistance, displacement, degree)
     error = polynomial(resistance) - displacement
     return DisplacementFit(
