@@ -23,6 +23,7 @@ import mujoco.batch
 import numpy as np
 from numpy.typing import NDArray
 
+from tca_mj.checks import Count, door, instance, shown
 from tca_mj.couple import Inputs, advance, measure, write
 from tca_mj.forks import Held, keep_for_ever
 from tca_mj.model.smooth import SmoothBody, Strained
@@ -47,7 +48,8 @@ class SimulationBatch(Held):
         physics: MuJoCo's batch, which has a model and a state for each of them.
     """
 
-    def __init__(self, sims: Sequence[Simulation], *, threads: int = 1) -> None:
+    @door
+    def __init__(self, sims: Sequence[Simulation], *, threads: Count = 1) -> None:
         """Takes simulations of the same part with the same time steps.
 
         Raises:
@@ -57,9 +59,7 @@ class SimulationBatch(Held):
         super().__init__()
         self.sims = tuple(sims)
         if not self.sims:
-            raise ValueError("sims is empty; a batch needs at least 1 simulation")
-        if threads < 1:
-            raise ValueError(f"threads must be at least 1, got {threads}")
+            raise ValueError("sims must hold at least 1 simulation, got none")
         if len({id(sim) for sim in self.sims}) < len(self.sims):
             raise ValueError("sims must be different objects")
         first = self.sims[0]
@@ -101,8 +101,10 @@ class SimulationBatch(Held):
                 "a batch must be stepped by the process that made it, not by one forked off it,"
                 " where its threads are not; make one there"
             )
-        if len(drives) != len(self.sims):
-            raise ValueError(f"drives must be {len(self.sims)}, got {len(drives)}")
+        if not isinstance(drives, Sequence) or len(drives) != len(self.sims):
+            raise ValueError(f"drives must be a list of {len(self.sims)}, got {shown(drives)}")
+        for drive in drives:
+            instance("a drive", drive, Drive | None)
         updates = self.sims[0].updates(duration)
         moving = [i for i, drive in enumerate(drives) if drive is not None]
         inputs = [

@@ -373,6 +373,8 @@ def _word(hint: Any) -> str:
         return _WORDS[hint]
     if get_origin(hint) is Annotated:
         return _word(get_args(hint)[0])
+    if get_origin(hint) in (Union, UnionType):
+        return " or ".join(map(_word, get_args(hint)))
     if get_origin(hint) is Literal:
         return f"one of {get_args(hint)}"
     name = str(getattr(get_origin(hint) or hint, "__name__", hint)).lstrip("_")

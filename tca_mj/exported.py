@@ -14,7 +14,7 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tca_mj.checks import floats
+from tca_mj.checks import door, floats
 from tca_mj.files import write_whole
 from tca_mj.model.part import Part
 from tca_mj.sim import Simulation, SimulationDiverged
@@ -23,6 +23,7 @@ REST = "rest"  # the keyframe of the rest that was found
 _STILL = 1e-2  # velocity with which MuJoCo's solver lets a joint creep at rest [rad/s, m/s]
 
 
+@door
 def export(
     part: Part, path: str | Path | None = None, *, temperatures: ArrayLike | None = None
 ) -> str:
@@ -59,6 +60,7 @@ def export(
     return frozen(sim, own.spec, path)
 
 
+@door
 def frozen(sim: Simulation, spec: mujoco.MjSpec, path: str | Path | None = None) -> str:
     """``export`` of a simulation as it is now.
 

@@ -31,11 +31,13 @@ def size(
     Raises:
         ValueError: If it is no number, or out of bounds.
     """
-    found = quantity(name, value, **({"above": 0.0} if at_least is None else {"at_least": at_least}))
+    least = {"above": 0.0} if at_least is None else {"at_least": at_least}
+    found = quantity(name, value, **least)
     if found > at_most:
         meant = _meant([found * 1e-3, found * 1e-6], 0.0, at_most, unit)
         raise ValueError(
-            f"{name} must be at most {at_most:g} {unit} ({kind} are below), got {shown(value)}{meant}"
+            f"{name} must be at most {at_most:g} {unit} ({kind} are below), got {shown(value)}"
+            f"{meant}"
         )
     return found
 

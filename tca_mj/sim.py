@@ -12,13 +12,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from functools import partial
+from typing import Annotated, Any
 
 import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tca_mj.actuation import Group, MixedBank, Signal, muscle_group
+from tca_mj.checks import NotNegative, Numbers, Positive, door, number, require_one_of
 from tca_mj.couple import Inputs, Writes, advance, measure, write
 from tca_mj.model.build import stage
 from tca_mj.model.mujoco_warnings import count_warnings
@@ -36,6 +38,14 @@ from tca_mj.tca import (
     TcaSpec,
     TcaState,
 )
+
+# Physics steps between two updates of the TCAs, and in one call: MuJoCo cannot be interrupted in
+# the former, and takes some ten microseconds for each of a small robot.
+MOST_SUBSTEPS, MOST_STEPS = 10_000, 1_000_000
+# 0.1 s is longer than a soft body swings, a microsecond shorter than any contact.
+Timestep = Annotated[float, partial(number, at_least=1e-6, at_most=0.1, unit="s")]
+COLDEST, HOTTEST = -40.0, 60.0  # surroundings in which TCAs and spines are cold, and were tried
+Ambient = Annotated[float, partial(number, at_least=COLDEST, at_most=HOTTEST, unit="°C")]
 
 _SLIDE = int(mujoco.mjtJoint.mjJNT_SLIDE)
 
@@ -104,13 +114,14 @@ class Simulation:
         array([41., 25., 25.])
     """
 
+    @door
     def __init__(
         self,
         part: Part,
         *,
-        timestep: float = 2e-3,
-        tca_period: float = 2e-2,
-        ambient: float = 25.0,
+        timestep: Timestep = 2e-3,
+        tca_period: Positive = 2e-2,
+        ambient: Ambient = 25.0,
         law: LawChoice = "surface",
         supply: Supply | None = None,
     ) -> None:
@@ -120,21 +131,20 @@ class Simulation:
 
         Args:
             part: What to simulate.
-            timestep: Physics time step [s].
-            tca_period: Time between two updates of the TCAs, a multiple of ``timestep`` [s].
-            ambient: Temperature of the surroundings and of the cold TCAs [°C].
+            timestep: Physics time step, 1 µs to 0.1 s [s].
+            tca_period: Time between two updates of the TCAs, a multiple of ``timestep``, at most
+                10 000 times as long [s].
+            ambient: Temperature of the surroundings and of the cold TCAs, -40 to 60 °C [°C].
             law: What computes the TCAs' tensions, see ``TcaBank``. If a coil has no "surface",
                 which no published one lacks, the exact "rod" takes its place; ``bank.law`` tells.
             supply: What the commands of ``step`` mean; by default they are powers.
 
         Raises:
-            ValueError: If a time is not positive or the period is no multiple of the time step, or
-                if there is no such ``law``.
+            ValueError: If a number is out of range, the period is no multiple of the time step, or
+                there is no such ``law``.
         """
-        if not (np.isfinite(timestep) and timestep > 0.0):
-            raise ValueError(f"timestep must be finite and above 0 s, got {timestep}")
-        ratio = tca_period / timestep
-        substeps = round(ratio) if np.isfinite(ratio) else 0
+        number("tca_period", tca_period, at_most=MOST_SUBSTEPS * timestep, unit="s")
+        substeps = round(tca_period / timestep)
         if substeps < 1 or abs(substeps * timestep - tca_period) > 1e-9:
             raise ValueError(
                 f"tca_period must be a positive multiple of timestep {timestep} s, got {tca_period}"
@@ -180,6 +190,7 @@ class Simulation:
         self.__dict__.update(state)
         count_warnings()
 
+    @door
     def reset(self, place: Callable[[mujoco.MjData], None] | None = None) -> None:
         """Back to the unloaded shape at ambient temperature, whatever happened before.
 
@@ -217,9 +228,11 @@ class Simulation:
         self.tca, power = self.bank.steady(temperature)
         return power
 
+    @door
     def rest(
-        self, temperature: ArrayLike, *, warming: float = 1.0, longest: float = 20.0,
-        quiet: float = 3e-5,
+        self, temperature: Numbers, *, warming: NotNegative = 1.0,
+        longest: Annotated[float, partial(number, above=0.0, at_most=1000.0, unit="s")] = 20.0,
+        quiet: NotNegative = 3e-5,
     ) -> float:  # fmt: skip
         """Warms the TCAs and waits until nothing moves any more: an equilibrium as a user finds it.
 
@@ -228,7 +241,8 @@ class Simulation:
         Args:
             temperature: Temperatures, shape (n,), not below the surroundings' [°C].
             warming: Time in which they are led there [s].
-            longest: Time after which it ends at the latest, a multiple of 0.1 s [s].
+            longest: Time after which it ends at the latest, a multiple of 0.1 s, at most 1000 s
+                [s].
             quiet: Largest velocity of a joint with which it ends before [m/s, rad/s].
 
         Returns:
@@ -243,7 +257,7 @@ class Simulation:
         try:
             for time in 0.1 * np.arange(1, round(10.0 * longest) + 1):
                 share = min(time / warming, 1.0) if warming else 1.0
-                self.step(self.keep(ambient + share * (np.asarray(temperature) - ambient)), 0.1)
+                self.step(self.keep(ambient + share * (temperature - ambient)), 0.1)
                 left = float(np.abs(self.data.qvel).max(initial=0.0))
                 if share == 1.0 and left < quiet:
                     break
@@ -323,12 +337,20 @@ class Simulation:
     @property
     def groups(self) -> tuple[Group, ...]:
         """Everything that drives the body, kind by kind: muscles, spines, motors."""
+        return tuple(self.group(kind) for kind in self._kinds)
+
+    @property
+    def _kinds(self) -> list[str]:
         kinds = [bank.kind for _, bank in getattr(self.bank, "kinds", ((None, self.bank),))]
-        kinds += ["spine"] * bool(self.spines.n) + ["motor"] * bool(self.motors)
-        return tuple(self.group(kind) for kind in kinds)
+        return kinds + ["spine"] * bool(self.spines.n) + ["motor"] * bool(self.motors)
 
     def group(self, kind: str) -> Group:
-        """One of ``groups``: "TCA", the kind of another bank, "spine" or "motor"."""
+        """One of ``groups``: "TCA", the kind of another bank, "spine" or "motor".
+
+        Raises:
+            ValueError: If there is none of this kind.
+        """
+        require_one_of("kind", kind, self._kinds)
         if kind == "spine":
             spines = self.spines
             return Group(
@@ -382,14 +404,15 @@ class Simulation:
 
         Args:
             command: Command of the TCAs, shape (n,): powers [W], or what ``bank.supply`` says.
-            duration: Time to advance by [s].
+            duration: Time to advance by, at most a million physics steps: some minutes of
+                computing, in which nothing can be said [s].
             voltage: Voltage of the spines' heaters, shape (spines.n,) or one for all [V].
             fan: Whether air is blown at the spines, shape (spines.n,) or one for all.
 
         Raises:
             ValueError: If the command has the wrong shape, is negative or not finite, the voltage
-                or the fan has the wrong shape or is not finite, or the duration is no multiple of
-                ``tca_period``.
+                or the fan has the wrong shape, is not finite, or there are no spines, or the
+                duration is no multiple of ``tca_period`` or too long.
             SimulationOverheated: If a TCA would be hotter than its fibre melts at.
             SimulationDiverged: If the state is no longer finite, or a TCA is shorter, longer or
                 hotter than its law holds for.
@@ -433,9 +456,11 @@ class Simulation:
         """How many updates of the TCAs a duration [s] takes.
 
         Raises:
-            ValueError: If it is no multiple of ``tca_period``.
+            ValueError: If it is no multiple of ``tca_period``, or more than a million of physics
+                steps.
         """
-        updates = round(duration / self.tca_period) if np.isfinite(duration) else 0
+        longest = MOST_STEPS // self.substeps * self.tca_period
+        updates = round(number("duration", duration, at_most=longest, unit="s") / self.tca_period)
         if updates < 1 or abs(updates * self.tca_period - duration) > 1e-9:
             raise ValueError(
                 f"duration must be a positive multiple of tca_period {self.tca_period} s,"

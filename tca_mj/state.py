@@ -10,6 +10,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from tca_mj.checks import instance
 from tca_mj.model.smooth import Strained
 from tca_mj.sim import Simulation
 from tca_mj.smp import HeaterSpec, SpinesState
@@ -62,6 +63,8 @@ def get_state(sim: Simulation, old: SimulationState | None = None) -> Simulation
         sim: The simulation.
         old: A state of it that is no longer wanted, whose memory is taken: a hundred times faster.
     """
+    instance("sim", sim, Simulation)
+    instance("old", old, SimulationState | None)
     spines = sim.spines
     if old is None:
         data = copy.copy(sim.data)
@@ -95,6 +98,8 @@ def set_state(sim: Simulation, state: SimulationState) -> None:
     Raises:
         ValueError: If the simulation was built of another part.
     """
+    instance("sim", sim, Simulation)
+    instance("state", state, SimulationState)
     if state.data.qpos.shape != sim.data.qpos.shape or state.power.shape != sim.power.shape:
         raise ValueError(
             f"state must be of a simulation with {sim.data.qpos.size} positions and {sim.n} TCAs,"

@@ -8,20 +8,22 @@ simulation as it was built, bit for bit.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
-from typing import Any, TypeVar
+from functools import partial
+from typing import Annotated, Any, TypeVar
 
 import numpy as np
 
-from tca_mj.sim import Simulation
+from tca_mj.checks import Checked, door, instance, number, shown
+from tca_mj.sim import COLDEST, HOTTEST, Simulation
 from tca_mj.smp import HeaterSpec
 from tca_mj.tca import HeatSpec
 
 Heat = TypeVar("Heat", HeatSpec, HeaterSpec)
 
 AMBIENT = 25.0  # temperature of the surroundings if nothing is said [°C]
+MOST_SPREAD = 0.95  # of factors, none of which may be below its bound
 AMBIENT_SPREAD = 25.0  # what a spread of 1 means for it [K]
 
 # Arrays of a model that are proportional to all masses, to their inverse, and to friction. The
@@ -31,36 +33,40 @@ _INVERSE = ("body_invweight0", "dof_invweight0", "tendon_invweight0")
 _FRICTION = ("geom_friction",)
 
 
+# By how much a robot can be off: as far as the robots of all tasks come to rest, move and are seen
+# within the bounds of their observations.
+BOUNDS = {
+    "friction": (0.01, 10.0), "mass": (0.05, 10.0), "tca_gain": (0.05, 5.0),
+    "heat_loss": (0.05, 10.0), "ambient": (COLDEST, HOTTEST),
+}  # fmt: skip
+
+
+def _between(name: str) -> dict[str, float]:
+    low, high = BOUNDS[name]
+    return {"at_least": low, "at_most": high}
+
+
 @dataclass(frozen=True, kw_only=True, slots=True)
-class Variation:
+class Variation(Checked):
     """Factors over what a simulation was built with, and the temperature of its surroundings.
 
     Attributes:
-        friction: Of all coefficients of friction [1].
-        mass: Of all masses and inertias [1].
-        tca_gain: Of the tension of every TCA, and so of its slope [1].
+        friction: Of all coefficients of friction, 0.01 to 10 [1].
+        mass: Of all masses and inertias, 0.05 to 10 [1].
+        tca_gain: Of the tension of every TCA, and so of its slope, 0.05 to 5 [1].
         heat_loss: Of the heat that TCAs, the bodies that they lie in and spines lose per excess
-            temperature [1].
-        ambient: Temperature of the surroundings, at which everything starts [°C].
+            temperature, 0.05 to 10 [1].
+        ambient: Temperature of the surroundings, at which everything starts, -40 to 60 °C [°C].
 
     Raises:
-        ValueError: If a factor is not finite and positive, or the temperature not above absolute
-            zero.
+        ValueError: If a number is out of these bounds.
     """
 
-    friction: float = 1.0
-    mass: float = 1.0
-    tca_gain: float = 1.0
-    heat_loss: float = 1.0
-    ambient: float = AMBIENT
-
-    def __post_init__(self) -> None:
-        for name in ("friction", "mass", "tca_gain", "heat_loss"):
-            value = getattr(self, name)
-            if not 0.0 < value < math.inf:
-                raise ValueError(f"{name} must be finite and above 0, got {value}")
-        if not -273.15 < self.ambient < math.inf:
-            raise ValueError(f"ambient must be finite and above -273.15 °C, got {self.ambient}")
+    friction: Annotated[float, partial(number, **_between("friction"))] = 1.0
+    mass: Annotated[float, partial(number, **_between("mass"))] = 1.0
+    tca_gain: Annotated[float, partial(number, **_between("tca_gain"))] = 1.0
+    heat_loss: Annotated[float, partial(number, **_between("heat_loss"))] = 1.0
+    ambient: Annotated[float, partial(number, unit="°C", **_between("ambient"))] = AMBIENT
 
     @classmethod
     def names(cls) -> tuple[str, ...]:
@@ -68,21 +74,23 @@ class Variation:
         return tuple(field.name for field in fields(cls))
 
     @classmethod
+    @door
     def drawn(cls, draws: Sequence[float], spread: float) -> Variation:
         """A variation from one uniform draw for each field.
 
         Args:
             draws: Numbers between -1 and 1, one for each of ``names``.
             spread: Factors are 1 + spread times a draw, the ambient temperature is 25 °C + 25 K
-                times spread times the last one; at least 0 and below 1.
+                times spread times the last one; 0 to 0.95.
 
         Raises:
             ValueError: If numbers are missing or out of range.
         """
         if len(draws) != len(cls.names()) or not all(-1.0 <= draw <= 1.0 for draw in draws):
-            raise ValueError(f"draws must be {len(cls.names())} within -1 and 1, got {draws}")
-        if not 0.0 <= spread < 1.0:
-            raise ValueError(f"spread must be at least 0 and below 1, got {spread}")
+            raise ValueError(
+                f"draws must be {len(cls.names())} within -1 and 1, got {shown(draws)}"
+            )
+        number("spread", spread, at_least=0.0, at_most=MOST_SPREAD)
         *factors, last = (spread * float(draw) for draw in draws)
         friction, mass, tca_gain, heat_loss = (1.0 + factor for factor in factors)
         return cls(
@@ -102,6 +110,7 @@ class Nominal:
         heat: Thermal constants of the TCAs.
     """
 
+    @door
     def __init__(self, sim: Simulation) -> None:
         """Keeps the figures of a simulation.
 
@@ -123,6 +132,7 @@ class Nominal:
         To be followed by ``Simulation.reset``: the temperatures and tensions that the simulation
         has at the moment are those of before.
         """
+        instance("variation", variation, Variation)
         sim, model = self._sim, self._sim.model
         for names, factor in (
             (_MASSES, variation.mass),

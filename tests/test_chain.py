@@ -512,7 +512,7 @@ def test_a_stretched_tca_is_shorter_than_its_route():
     ("make", "message"),
     [
         (lambda: built(nodes=0), "nodes must be at least 1, got 0"),
-        (lambda: built(motions=("bend",)), r"motions must be some of .*, got \('bend',\)"),
+        (lambda: built(motions=("bend",)), r"motions\[0\] must be one of .*, got 'bend'"),
         (lambda: built(motions=()), r"motions must be some of .*, got \(\)"),
         (lambda: lay(Helix(5e-3)), r"route of tca must stay inside .* \(0\.00500, 0\.00000\) m"),
         (lambda: lay(Helix(4e-3, 5.0)), "at least three sites per turn, got 1.60"),

@@ -10,8 +10,8 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tca_mj.checks import Array
-from tca_mj.model.chain import Chain, add_chain
+from tca_mj.checks import Array, door
+from tca_mj.model.chain import Chain, Nodes, add_chain
 from tca_mj.model.mujoco_warnings import count_warnings
 from tca_mj.model.part import new_spec
 from tca_mj.model.smooth import SmoothBody, Strained
@@ -48,12 +48,13 @@ class NotSettledError(ArithmeticError):
         self.residual = residual
 
 
+@door
 def settle(
     beam: BeamSpec,
     routes: Sequence[Route],
     tensions: Sequence[float | StrandLaw],
     *,
-    nodes: int,
+    nodes: Nodes,
     tip_force: ArrayLike = (0.0, 0.0, 0.0),
     tip_moment: ArrayLike = (0.0, 0.0, 0.0),
     gravity: ArrayLike = (0.0, 0.0, 0.0),
@@ -68,7 +69,7 @@ def settle(
         routes: Routes of the k TCAs, which are weightless here and may lie outside the body.
         tensions: For each of them its tension, at least 0 [N], or its law, for a TCA at a
             temperature: from the length of its route to tension and slope.
-        nodes: Nodes of the chain.
+        nodes: Nodes of the chain, 1 to 128.
         tip_force: Force on the tip in the world's frame, shape (3,) [N].
         tip_moment: Moment on the tip in the world's frame, shape (3,) [N m].
         gravity: Acceleration of gravity in the world's frame, shape (3,) [m/s²].

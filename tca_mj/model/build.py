@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import mujoco
 
+from tca_mj.checks import door, instance, text
 from tca_mj.hints import nearest
 from tca_mj.model.chain import Chain
 from tca_mj.model.part import Part
@@ -48,6 +49,8 @@ def add_tca(
         >>> add_tca(part, chain, Helix(3e-3), "free-stroke").path_length
         0.045
     """
+    instance("part", part, Part)
+    instance("chain", chain, Chain)
     if isinstance(tca, str):
         if tca not in CATALOGUE:
             raise ValueError(
@@ -55,7 +58,8 @@ def add_tca(
                 f"{nearest(tca, CATALOGUE)}"
             )
         tca = CATALOGUE[tca]
-    name = f"tca{len(part.tcas)}" if name is None else name
+    instance("tca", tca, TcaSpec)
+    name = f"tca{len(part.tcas)}" if name is None else text("name", name)
     if name in [other.name for other in part.tcas]:
         raise ValueError(f"name must be new in this part, got {name!r} again")
     laid = lay_tca(part.spec, tca, route_passes(chain, route), name=name)
@@ -63,6 +67,7 @@ def add_tca(
     return laid
 
 
+@door
 def stage(part: Part, *, floor: float | None = None) -> None:
     """Gives a bare part a sky, a light and the camera ``view``; a simulation does it by itself.
 

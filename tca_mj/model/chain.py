@@ -14,12 +14,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Literal
+from functools import partial
+from typing import Annotated, Any, Literal
 
 import mujoco
 import numpy as np
 
-from tca_mj.checks import Array, require_count
+from tca_mj.checks import Array, door, row, shown, whole
 from tca_mj.model.surface import surface
 from tca_mj.rod.beam import BeamSpec, Outline
 from tca_mj.rod.lie import quaternion_exp, quaternion_matrix
@@ -31,6 +32,25 @@ MOTIONS: tuple[Motion, ...] = ("stretch", "bend_x", "bend_y", "twist")  # all of
 # Axis of each motion in the piece's frame, z along the beam.
 _AXIS = {"stretch": (0, 0, 1), "bend_x": (1, 0, 0), "bend_y": (0, 1, 0), "twist": (0, 0, 1)}
 _REFERENCE = {"bend_x": 0, "bend_y": 1, "twist": 2}  # component of the reference curvature
+
+
+# The time of a step grows with the third power: 128 nodes take two hundred times as long as 8.
+MOST_NODES = 128
+Nodes = Annotated[int, partial(whole, at_least=1, at_most=MOST_NODES)]
+
+
+def _quaternion(name: str, value: Any) -> tuple[float, ...]:
+    found = row(name, value, shape=(4,))
+    if not any(found):
+        raise ValueError(f"{name} must be a rotation, got {shown(value)}")
+    return found
+
+
+Place = Annotated[Sequence[float], partial(row, shape=(3,))]
+Quaternion = Annotated[Sequence[float], _quaternion]
+Colour = Annotated[Sequence[float], partial(row, shape=(4,), at_least=0.0, at_most=1.0)]
+Friction = Annotated[Sequence[float], partial(row, shape=(3,), at_least=0.0)]
+
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,29 +91,33 @@ class Chain:
 
     def local(self, piece: int) -> float:
         """z of the piece's point in the piece's own frame [m]."""
+        whole("piece", piece, at_least=0, at_most=self.nodes)
         return 0.0 if piece == 0 else self.piece / 2.0
 
     def extent(self, piece: int) -> float:
         """Length of a piece; the first and the last one are half as long as the others [m]."""
+        whole("piece", piece, at_least=0, at_most=self.nodes)
         return self.piece * (0.5 if piece in (0, self.nodes) else 1.0)
 
+    @door
     def mark_tip(self, name: str, beyond: float = 0.0) -> None:
         """Adds the site ``name`` on the axis, ``beyond`` the tip [m]."""
         z = self.local(self.nodes) + beyond
         self.tip.add_site(name=name, pos=[0.0, 0.0, z], group=4)
 
 
+@door
 def add_chain(
     parent: mujoco.MjsBody,
     spec: BeamSpec,
     *,
-    nodes: int,
+    nodes: Nodes,
     name: str,
     motions: Sequence[Motion] = MOTIONS,
-    pos: Sequence[float] = (0.0, 0.0, 0.0),
-    quat: Sequence[float] = (1.0, 0.0, 0.0, 0.0),
-    rgba: Sequence[float] = (0.95, 0.91, 0.85, 0.35),
-    friction: Sequence[float] = (1.0, 0.005, 0.0001),
+    pos: Place = (0.0, 0.0, 0.0),
+    quat: Quaternion = (1.0, 0.0, 0.0, 0.0),
+    rgba: Colour = (0.95, 0.91, 0.85, 0.35),
+    friction: Friction = (1.0, 0.005, 0.0001),
     collide: bool = True,
 ) -> Chain:
     """Adds a beam to ``parent``, its base at ``pos`` and its axis along the local z.
@@ -101,7 +125,7 @@ def add_chain(
     Args:
         parent: Body that holds the base.
         spec: The beam.
-        nodes: Number of nodes.
+        nodes: Number of nodes, 1 to 128.
         name: Prefix of all names.
         motions: Motions of each node; leave out those the part does not need.
         pos: Position of the base in the parent's frame [m].
@@ -126,10 +150,8 @@ def add_chain(
         >>> len(chain.joints)
         8
     """
-    require_count(nodes=nodes)
-    unknown = [motion for motion in motions if motion not in MOTIONS]
-    if unknown or not motions:
-        raise ValueError(f"motions must be some of {MOTIONS}, got {tuple(motions)}")
+    if not motions:
+        raise ValueError(f"motions must be some of {MOTIONS}, got {motions}")
     kept: tuple[Motion, ...] = tuple(motion for motion in MOTIONS if motion in motions)
     cell = spec.length / nodes
     half_turn = 0.5 * cell * float(np.linalg.norm(spec.curvature[:2]))

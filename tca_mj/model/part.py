@@ -7,12 +7,13 @@ from dataclasses import dataclass, field
 
 import mujoco
 
+from tca_mj.checks import Checked, door
 from tca_mj.model.spine import RoutedSpine
 from tca_mj.model.tendon import RoutedTca
 
 
 @dataclass(slots=True)
-class Part:
+class Part(Checked):
     """A module, a robot or a whole scene; parts are attached to parts.
 
     Attributes:
@@ -20,6 +21,9 @@ class Part:
         tcas: The TCAs in it, in the order of a simulation's actuator axis.
         sites: Names of sites with a meaning, for example ``tip``.
         spines: The shape-memory spines in it, in the order of a simulation's heater axis.
+
+    Raises:
+        ValueError: If a field is something else.
 
     Example:
         >>> import tca_mj
@@ -33,6 +37,7 @@ class Part:
     sites: dict[str, str] = field(default_factory=dict)
     spines: tuple[RoutedSpine, ...] = ()
 
+    @door
     def attach(
         self, child: Part, *, to: str, prefix: str, names: Sequence[str] | None = None
     ) -> None:
@@ -67,6 +72,7 @@ class Part:
                 self.sites[f"{prefix}.{key}"] = f"{prefix}.{value}"
 
 
+@door
 def new_spec(name: str) -> mujoco.MjSpec:
     """An empty specification with the solver settings of all models of this package.
 
@@ -89,6 +95,7 @@ def new_spec(name: str) -> mujoco.MjSpec:
     return spec
 
 
+@door
 def set_options(spec: mujoco.MjSpec) -> None:
     """Gives a specification the solver settings of ``new_spec``, and radians.
 

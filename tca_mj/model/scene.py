@@ -7,10 +7,12 @@ from pathlib import Path
 
 import mujoco
 
+from tca_mj.checks import door
 from tca_mj.model.part import Part, set_options
 
 
-def load(path: Path) -> mujoco.MjSpec:
+@door
+def load(path: str | Path) -> mujoco.MjSpec:
     """Reads an MJCF file into a specification.
 
     Args:
@@ -19,12 +21,18 @@ def load(path: Path) -> mujoco.MjSpec:
     Raises:
         ValueError: If the file does not exist or is no MJCF.
     """
-    if not path.is_file():
+    if not Path(path).is_file():
         raise ValueError(f"path must be an MJCF file, got {path}")
-    return mujoco.MjSpec.from_file(str(path))
+    try:
+        return mujoco.MjSpec.from_file(str(path))
+    except ValueError as error:
+        raise ValueError(f"path must be an MJCF file, got {path}: {error}") from error
 
 
-def scene(arena: Path, robot: Part, objects: Mapping[str, Path], *, name: str = "robot") -> Part:
+@door
+def scene(
+    arena: str | Path, robot: Part, objects: Mapping[str, str | Path], *, name: str = "robot"
+) -> Part:
     """Puts a robot and objects into an arena.
 
     The robot's names get ``name`` and a dot in front, an object's names its key and a dot.

@@ -5,9 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from functools import partial
+from typing import Annotated, Any
 
-from tca_mj.checks import require_count, require_positive
+from tca_mj.checks import Checked, Positive, door, require_positive, whole
 from tca_mj.model.chain import Chain, Motion
 from tca_mj.rod.beam import BeamSpec, torsion_constant
 from tca_mj.smp import HeaterSpec, SpineSpec
@@ -18,7 +19,7 @@ SHEAR_RATIO = 1.0 / 2.8
 
 
 @dataclass(frozen=True, slots=True)
-class RoutedSpine:
+class RoutedSpine(Checked):
     """A spine in a built part.
 
     Attributes:
@@ -39,19 +40,22 @@ class RoutedSpine:
     heater: HeaterSpec
     joints: tuple[tuple[str, float], ...]
     tca: str
-    damping_time: float = 5e-3
+    damping_time: Positive = 5e-3
 
+    @door
     def renamed(self, prefix: str) -> RoutedSpine:
         """The same with a prefix before all names."""
         joints = tuple((prefix + joint, share) for joint, share in self.joints)
         return replace(self, name=prefix + self.name, tca=prefix + self.tca, joints=joints)
 
     def __post_init__(self) -> None:
-        require_positive(damping_time=self.damping_time, **dict(self.joints))
+        Checked.__post_init__(self)
+        require_positive(**dict(self.joints))
         if len({name for name, _ in self.joints}) < len(self.joints):
             raise ValueError(f"joints of {self.name} must differ, got {self.joints}")
 
 
+@door
 def route_spine(
     spec: SpineSpec,
     heater: HeaterSpec,
@@ -60,7 +64,7 @@ def route_spine(
     name: str,
     tca: str,
     torsion: float | Sequence[float] | None = None,
-    damping_time: float = 5e-3,
+    damping_time: Positive = 5e-3,
 ) -> RoutedSpine:
     """Lets a spine stiffen the joints of the chains it runs through.
 
@@ -100,6 +104,7 @@ def route_spine(
     return RoutedSpine(name, spec, heater, tuple(joints), tca, damping_time)
 
 
+@door
 def sheath(spec: SpineSpec, share: float, **more: Any) -> BeamSpec:
     """What a chain has besides its shape-memory spines: tube, wires, what is seen and weighs.
 
@@ -114,7 +119,11 @@ def sheath(spec: SpineSpec, share: float, **more: Any) -> BeamSpec:
     return BeamSpec(bending=(soft, soft), torsion=soft, stretching=along, shearing=along, **more)
 
 
-def lumped_torsion(spec: SpineSpec, places: Sequence[float], nodes: int) -> tuple[float, ...]:
+@door
+def lumped_torsion(
+    spec: SpineSpec, places: Sequence[float],
+    nodes: Annotated[int, partial(whole, at_least=1, at_most=1000)],
+) -> tuple[float, ...]:  # fmt: skip
     """Torsional stiffness over E of one of several parallel spines between two rigid rails [m⁴].
 
     Rails that pitch against each other by φ do two things. They twist each spine evenly, against
@@ -127,15 +136,16 @@ def lumped_torsion(spec: SpineSpec, places: Sequence[float], nodes: int) -> tupl
     Args:
         spec: The spine.
         places: Distances d of the spines from the axis; the result is their mean [m].
-        nodes: Number of equal cells from rail to rail.
+        nodes: Number of equal cells from rail to rail, 1 to 1000.
 
     Returns:
         One number per cell.
 
     Raises:
-        ValueError: If ``nodes`` is no whole number above 0.
+        ValueError: If there is no place, or ``nodes`` is out of range.
     """
-    require_count(nodes=nodes)
+    if not places:
+        raise ValueError("places must have at least 1, got none")
     spread = math.fsum(d * d for d in places) / len(places)
     even = SHEAR_RATIO * torsion_constant(spec.width, spec.thickness)
     uneven = 12.0 * spec.second_moment * spread / spec.length**2

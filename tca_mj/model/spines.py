@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tca_mj.checks import Array, within
+from tca_mj.checks import Array, flags, within
 from tca_mj.model.curves import summed
 from tca_mj.model.smooth import SmoothBody
 from tca_mj.model.spine import RoutedSpine
@@ -112,12 +112,17 @@ class Spines:
         """Voltages and fans as arrays of shape (n,).
 
         Raises:
-            ValueError: If one has the wrong shape or is not finite.
+            ValueError: If one has the wrong shape or is not finite, or there are no spines.
         """
-        volts, blown = within("voltage", voltage), np.asarray(fan, dtype=bool)
+        volts, blown = within("voltage", voltage), flags("fan", fan)
         for name, array in (("voltage", volts), ("fan", blown)):
             if array.shape not in ((), (self.n,)):
                 raise ValueError(f"{name} must have shape ({self.n},), got {array.shape}")
+            if not self.n and array.any():
+                raise ValueError(
+                    f"{name} must be 0: there is no shape-memory spine, and TCAs are driven by the"
+                    f" command, got {array}"
+                )
         return np.full(self.n, volts), np.full(self.n, blown)
 
     def advance(

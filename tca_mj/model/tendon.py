@@ -20,20 +20,24 @@ from dataclasses import dataclass, replace
 import mujoco
 import numpy as np
 
-from tca_mj.checks import Array
+from tca_mj.actuation import Muscle
+from tca_mj.checks import Array, Checked, door
 from tca_mj.model.chain import Chain, Motion
 from tca_mj.routes import Helix, Route, leg_length, require_route
 from tca_mj.tca import TcaSpec
 
 
 @dataclass(frozen=True, slots=True)
-class Pass:
+class Pass(Checked):
     """One leg of a TCA through one chain.
 
     Attributes:
         chain: The chain.
         leg: The leg, described from base to tip.
         down: Whether the TCA follows it from tip to base.
+
+    Raises:
+        ValueError: If a field is something else.
     """
 
     chain: Chain
@@ -80,6 +84,7 @@ class RoutedTca:
     stretch: float
     crossings: tuple[Crossing, ...]
 
+    @door
     def renamed(self, prefix: str) -> RoutedTca:
         """The same TCA in a part whose names all got ``prefix`` in front."""
         crossings = tuple(
@@ -89,6 +94,7 @@ class RoutedTca:
         return replace(self, name=prefix + self.name, crossings=crossings)
 
 
+@door
 def route_passes(chain: Chain, route: Route) -> tuple[Pass, ...]:
     """The passes of a route through one chain: up along the first leg, down the second, ...
 
@@ -103,9 +109,10 @@ def route_passes(chain: Chain, route: Route) -> tuple[Pass, ...]:
     return tuple(Pass(chain, leg, down=bool(i % 2)) for i, leg in enumerate(legs))
 
 
+@door
 def route_tca(
     spec: mujoco.MjSpec,
-    tca: TcaSpec,
+    tca: TcaSpec | Muscle,
     passes: Sequence[Pass],
     *,
     name: str,
@@ -162,9 +169,11 @@ def route_tca(
     return RoutedTca(name, tca, length, stretch, tuple(crossings))
 
 
+@door
 def lay_tca(
-    spec: mujoco.MjSpec, tca: TcaSpec, passes: Sequence[Pass], *, name: str, ideal: bool = False
-) -> RoutedTca:
+    spec: mujoco.MjSpec, tca: TcaSpec | Muscle, passes: Sequence[Pass], *, name: str,
+    ideal: bool = False,
+) -> RoutedTca:  # fmt: skip
     """``route_tca`` of a TCA cut to the length of its passes, which raises the errors.
 
     Args:
@@ -177,6 +186,7 @@ def lay_tca(
     return route_tca(spec, tca.of_length(path_length(passes)), passes, name=name, ideal=ideal)
 
 
+@door
 def path_length(passes: Sequence[Pass]) -> float:
     """Length of a route in the unloaded bodies [m].
 

@@ -6,13 +6,13 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
-from tca_mj.checks import Checked, Count
+from tca_mj.checks import Checked, Positive, door
 from tca_mj.hints import Length, Section
 from tca_mj.model.build import add_tca
-from tca_mj.model.chain import add_chain
+from tca_mj.model.chain import Nodes, add_chain
 from tca_mj.model.part import Part, new_spec
 from tca_mj.rod.beam import BeamSpec
-from tca_mj.routes import Route, parallel
+from tca_mj.routes import Route, TcaCount, parallel
 from tca_mj.tca import CATALOGUE, TcaSpec
 from tca_mj.tca.embedding import SILICONE_DENSITY, in_silicone
 
@@ -20,7 +20,10 @@ SILICONE_YOUNG = 0.125e6  # Ecoflex 00-30, Sun, Section 5.3 [Pa]
 SILICONE_SHEAR = SILICONE_YOUNG / 3.0  # incompressible, Sun, Section 5.3 [Pa]
 
 
-def silicone_cylinder(length: float, diameter: float, outer_diameter: float) -> BeamSpec:
+@door
+def silicone_cylinder(
+    length: Positive, diameter: Positive, outer_diameter: Positive
+) -> BeamSpec:
     """A cylinder of Ecoflex 00-30.
 
     Args:
@@ -34,8 +37,9 @@ def silicone_cylinder(length: float, diameter: float, outer_diameter: float) -> 
     )  # fmt: skip
 
 
+@door
 def straight_module(
-    name: str, body: BeamSpec, nodes: int, tca: TcaSpec, routes: Mapping[str, Route]
+    name: str, body: BeamSpec, nodes: Nodes, tca: TcaSpec, routes: Mapping[str, Route]
 ) -> Part:
     """A soft body with its base at the origin and its axis along z.
 
@@ -97,8 +101,8 @@ class BendingSpec(Checked):
     diameter: Section = 4.5e-3
     outer_diameter: Section = 9e-3
     offset: Section = 4e-3
-    count: Count = 3
-    nodes: Count = 8
+    count: TcaCount = 3
+    nodes: Nodes = 8
     tca: TcaSpec = field(default_factory=lambda: CATALOGUE["free-stroke"])
 
     @property
@@ -115,6 +119,7 @@ class BendingSpec(Checked):
         return in_silicone(self.tca, section=section, perimeter=perimeter)
 
 
+@door
 def bending_module(spec: BendingSpec | None = None) -> Part:
     """Builds the module: base at the origin, axis along z, TCA 0 on the x side.
 

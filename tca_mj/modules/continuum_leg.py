@@ -9,14 +9,14 @@ from typing import Annotated
 
 import mujoco
 
-from tca_mj.checks import Checked, Count, Finite, Positive, number
+from tca_mj.checks import Checked, Finite, Positive, door, number
 from tca_mj.hints import Length, Mass, Section
 from tca_mj.model.build import add_tca
-from tca_mj.model.chain import Chain, Motion, add_chain
+from tca_mj.model.chain import Chain, Motion, Nodes, add_chain
 from tca_mj.model.part import Part, new_spec
 from tca_mj.model.surface import TOUCHES_NOTHING, surface
 from tca_mj.rod.beam import BeamSpec, Outline
-from tca_mj.routes import Helix
+from tca_mj.routes import Helix, TcaCount
 from tca_mj.tca import CATALOGUE, TcaSpec
 
 CARBON_YOUNG = 130e9  # pultruded carbon-fibre rod along its fibres; estimate from data sheets [Pa]
@@ -65,7 +65,7 @@ class LegSpec(Checked):
     rod_diameter: Section = 0.5e-3
     offset: Section = 8e-3
     phase: Finite = 0.0
-    count: Count = 3
+    count: TcaCount = 3
     plate_radius: Section = 9e-3
     plate_thickness: Section = 1e-3
     plate_fill: Annotated[float, partial(number, above=0.0, at_most=1.0)] = 0.5
@@ -75,7 +75,7 @@ class LegSpec(Checked):
     plate_friction: Positive = 0.3
     damping_time: Positive = 20e-3
     motions: tuple[Motion, ...] = ("bend_x", "bend_y", "twist")
-    nodes: Count = 3
+    nodes: Nodes = 3
     tca: TcaSpec = field(default_factory=lambda: CATALOGUE["free-stroke"])
 
     def __post_init__(self) -> None:
@@ -100,6 +100,7 @@ class LegSpec(Checked):
         return PRINTED_DENSITY * self.plate_fill * disc
 
 
+@door
 def continuum_leg(spec: LegSpec | None = None, *, mirrored: bool = False) -> Part:
     """Builds the leg: root at the origin, rod along z, TCA 0 at ``phase`` from x.
 

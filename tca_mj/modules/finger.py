@@ -12,9 +12,9 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Annotated
 
-from tca_mj.checks import Checked, Count, NotNegative
+from tca_mj.checks import Checked, NotNegative, door
 from tca_mj.hints import Length, Modulus, Section, angle, size
-from tca_mj.model.chain import add_chain
+from tca_mj.model.chain import Nodes, add_chain
 from tca_mj.model.part import Part, new_spec
 from tca_mj.model.tendon import Pass, lay_tca
 from tca_mj.modules.bending import SILICONE_YOUNG
@@ -68,7 +68,7 @@ class FingerPairSpec(Checked):
     offset: Annotated[float, _across] = 2.5e-3
     half_width: Annotated[float, _across] = 1.5e-3
     closure: Annotated[float, partial(angle, below=2.0 * math.pi)] = math.pi
-    nodes: Count = 8
+    nodes: Nodes = 8
     friction: NotNegative = 1.0
     tca: TcaSpec = field(default_factory=lambda: CATALOGUE["free-stroke"])
 
@@ -113,6 +113,7 @@ class FingerPairSpec(Checked):
         return UTurn.parallel(self.offset, self.half_width)
 
 
+@door
 def finger_pair(spec: FingerPairSpec | None = None) -> Part:
     """Builds the gripper: held at the origin, the fingers in the x-z plane, their tips below z.
 

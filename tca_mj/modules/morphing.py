@@ -14,9 +14,9 @@ from typing import Annotated
 
 import mujoco
 
-from tca_mj.checks import Checked, Count, Positive
+from tca_mj.checks import Checked, Positive, door
 from tca_mj.hints import Mass, Section, size
-from tca_mj.model.chain import Chain, Motion, add_chain
+from tca_mj.model.chain import Chain, Motion, Nodes, add_chain
 from tca_mj.model.part import Part, new_spec
 from tca_mj.model.spine import route_spine, sheath
 from tca_mj.model.surface import surface
@@ -64,7 +64,7 @@ class MorphingSpec(Checked):
     tip_mass: Annotated[float, _weight] = 0.0
     damping_time: Positive = 20e-3
     motions: tuple[Motion, ...] = ("bend_x", "bend_y", "twist")
-    nodes: Count = 10
+    nodes: Nodes = 10
 
     def __post_init__(self) -> None:
         Checked.__post_init__(self)
@@ -91,6 +91,7 @@ class MorphingSpec(Checked):
         return UTurn.parallel(self.spine.tca_offset, self.half_width, -math.pi / 2.0)
 
 
+@door
 def morphing_module(spec: MorphingSpec | None = None) -> Part:
     """Builds the module: clamped at the origin, straight along z, memorised straight.
 

@@ -5,8 +5,9 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 
-from tca_mj.checks import Checked, Count, number
+from tca_mj.checks import Checked, door, number
 from tca_mj.hints import Length, Section
+from tca_mj.model.chain import Nodes
 from tca_mj.model.part import Part
 from tca_mj.modules.bending import silicone_cylinder, straight_module
 from tca_mj.rod.beam import BeamSpec
@@ -55,7 +56,7 @@ class TwistingSpec(Checked):
     radius: Section = 3.5e-3
     turns: float = 5.0
     double: bool = True
-    nodes: Count = 8
+    nodes: Nodes = 8
     tca: TcaSpec = field(default_factory=lambda: CATALOGUE["free-stroke"])
     tube: Section = 3.2e-3
 
@@ -83,6 +84,7 @@ class TwistingSpec(Checked):
         return Helix(self.radius, self.turns)
 
 
+@door
 def twisting_module(spec: TwistingSpec | None = None) -> Part:
     """Builds the module: base at the origin, axis along z.
 

@@ -11,7 +11,7 @@ from typing import Annotated
 
 import mujoco
 
-from tca_mj.checks import Checked, number, within
+from tca_mj.checks import Checked, door, number, within
 from tca_mj.hints import Mass, Section, size
 from tca_mj.model.part import Part, new_spec
 from tca_mj.model.surface import TOUCHES_NOTHING
@@ -61,6 +61,7 @@ class ArmSpec(Checked):
 _DOWN = (0.0, 1.0, 0.0, 0.0)  # z to -z, half a turn about x
 
 
+@door
 def arm(spec: ArmSpec | None = None) -> Part:
     """Builds the arm, hanging from a base whose slide ``lift`` moves it up and down.
 

@@ -19,9 +19,9 @@ from typing import Annotated, Any
 
 import mujoco
 
-from tca_mj.checks import Checked, Count, Positive
+from tca_mj.checks import Checked, Finite, Positive, door
 from tca_mj.hints import Length, Mass, Section, angle
-from tca_mj.model.chain import Chain, Motion, add_chain
+from tca_mj.model.chain import Chain, Motion, Nodes, add_chain
 from tca_mj.model.part import Part, new_spec
 from tca_mj.model.spine import lumped_torsion, route_spine, sheath
 from tca_mj.model.surface import TOUCHES_NOTHING, surface
@@ -83,13 +83,14 @@ class TetrapodSpec(Checked):
     leg_station: Length = 62e-3
     leg_height: Section = 6e-3
     belly_friction: Positive = 0.3
-    nodes: Count = 4
+    nodes: Nodes = 4
 
     @property
     def places(self) -> tuple[float, ...]:
         """Fore-aft positions of the spines, from the rear one on [m]."""
         return tuple(self.spacing * (i - (SPINES - 1) / 2) for i in range(SPINES))
 
+    @door
     def body(self, *, count: int, length: float, curves: float) -> BeamSpec:
         """Some of the spines as one beam, but for what shape memory adds.
 
@@ -107,6 +108,7 @@ class TetrapodSpec(Checked):
         )  # fmt: skip
 
 
+@door
 def tetrapod(spec: TetrapodSpec | None = None) -> Part:
     """Builds the robot: the middle of the spines at the origin, on a free joint ``root``.
 
@@ -136,8 +138,9 @@ def tetrapod(spec: TetrapodSpec | None = None) -> Part:
     return part
 
 
+@door
 def rigid_tetrapod(
-    spec: TetrapodSpec | None = None, *, bend: float = 0.0, nodes: int = 8
+    spec: TetrapodSpec | None = None, *, bend: Finite = 0.0, nodes: Nodes = 8
 ) -> Part:
     """Builds the robot of ``tetrapod`` with cold spines: its body is rigid, its legs alone move.
 
@@ -188,6 +191,7 @@ def _draw(mjspec: mujoco.MjSpec, tca: RoutedTca, halves: Mapping[str, Chain]) ->
                 mjspec.delete(site)
 
 
+@door
 def set_rigid_bend(model: mujoco.MjModel, bend: float, *, prefix: str = "") -> None:
     """Gives the body of a compiled ``rigid_tetrapod`` another bend.
 
