@@ -10,7 +10,7 @@ import numpy as np
 
 from tca_mj.envs.table import numbers
 from tca_mj.hints import nearest
-from tca_mj.variation import AMBIENT, AMBIENT_SPREAD, BOUNDS, Variation
+from tca_mj.variation import AMBIENT, AMBIENT_SPREAD, Variation
 
 Setup = dict[str, Any]
 """What an episode begins with: a value for every option of the task."""
@@ -180,8 +180,8 @@ def variation_options() -> tuple[Option, ...]:
         ),
         *(
             Option(
-                name=name, about=about[name], draw=_Varied(name), low=BOUNDS[name][0],
-                high=BOUNDS[name][1],
+                name=name, about=about[name], draw=_Varied(name),
+                low=Variation.bounds(name)[0], high=Variation.bounds(name)[1],
                 unit="°C" if name == "ambient" else "-",
                 drawn="25, or drawn" if name == "ambient" else "1, or drawn",
             )

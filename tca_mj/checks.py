@@ -315,6 +315,14 @@ def _arguments(function: Any) -> tuple[inspect.Signature, tuple[tuple[str, Check
     return signature, tuple((name, check) for name, check in found if check is not None)
 
 
+def bounds(hint: Any) -> tuple[float, float]:
+    """Least and largest value that a type lets pass; infinite where it has no bound."""
+    said = [getattr(check, "keywords", {}) for check in getattr(hint, "__metadata__", ())]
+    low = [each[name] for each in said for name in ("above", "at_least") if name in each]
+    high = [each[name] for each in said for name in ("below", "at_most") if name in each]
+    return max(low, default=-math.inf), min(high, default=math.inf)
+
+
 def by_type(hint: Any) -> Check | None:
     """What checks a value of a type; None for a type that says nothing, as ``Any``."""
     origin, inner = get_origin(hint), get_args(hint)

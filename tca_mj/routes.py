@@ -130,16 +130,6 @@ class UTurn(Checked):
         return cls(Helix(radius, turns, phase), Helix(radius, turns, phase + np.pi))
 
 
-class _Leg(Protocol):
-    """A curve along a body, from its base to its tip."""
-
-    def offset(self, s: Any, /) -> Any:
-        """Offset from the centre line at ``s`` in [0, 1], shape (..., 2) [m]."""
-
-    def slope(self, s: Any, /) -> Any:
-        """Derivative of the offset by ``s``, shape (..., 2) [m]."""
-
-
 class Route(Protocol):
     """Anything that can say which legs it has."""
 
@@ -168,6 +158,9 @@ def require_route(name: str, route: Any) -> Any:
     )
 
 
+AnyRoute = Annotated[Route, require_route]
+
+
 @door
 def parallel(count: TcaCount, radius: NotNegative, phase: float = 0.0) -> tuple[Helix, ...]:
     """Routes of ``count`` straight TCAs at equal angles round the centre line.
@@ -190,7 +183,7 @@ def parallel(count: TcaCount, radius: NotNegative, phase: float = 0.0) -> tuple[
 
 @door
 def leg_length(
-    leg: _Leg, body_length: Positive, curvature: Triple = (0.0, 0.0, 0.0),
+    leg: Any, body_length: Positive, curvature: Triple = (0.0, 0.0, 0.0),
     points: Annotated[int, partial(whole, at_least=2, at_most=1_000_000)] = 513,
 ) -> float:  # fmt: skip
     """Length of a leg in a body of uniform reference curvature.

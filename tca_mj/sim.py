@@ -44,8 +44,8 @@ from tca_mj.tca import (
 MOST_SUBSTEPS, MOST_STEPS = 10_000, 1_000_000
 # 0.1 s is longer than a soft body swings, a microsecond shorter than any contact.
 Timestep = Annotated[float, partial(number, at_least=1e-6, at_most=0.1, unit="s")]
-COLDEST, HOTTEST = -40.0, 60.0  # surroundings in which TCAs and spines are cold, and were tried
-Ambient = Annotated[float, partial(number, at_least=COLDEST, at_most=HOTTEST, unit="°C")]
+# Surroundings in which TCAs and spines are cold, and were tried.
+Ambient = Annotated[float, partial(number, at_least=-40.0, at_most=60.0, unit="°C")]
 
 _SLIDE = int(mujoco.mjtJoint.mjJNT_SLIDE)
 

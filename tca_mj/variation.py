@@ -11,12 +11,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from functools import partial
-from typing import Annotated, Any, TypeVar
+from typing import Annotated, Any, TypeVar, get_type_hints
 
 import numpy as np
 
-from tca_mj.checks import Checked, door, instance, number, shown
-from tca_mj.sim import COLDEST, HOTTEST, Simulation
+from tca_mj.checks import Checked, bounds, door, instance, number, shown
+from tca_mj.sim import Ambient, Simulation
 from tca_mj.smp import HeaterSpec
 from tca_mj.tca import HeatSpec
 
@@ -35,15 +35,10 @@ _FRICTION = ("geom_friction",)
 
 # By how much a robot can be off: as far as the robots of all tasks come to rest, move and are seen
 # within the bounds of their observations.
-BOUNDS = {
-    "friction": (0.01, 10.0), "mass": (0.05, 10.0), "tca_gain": (0.05, 5.0),
-    "heat_loss": (0.05, 10.0), "ambient": (COLDEST, HOTTEST),
-}  # fmt: skip
-
-
-def _between(name: str) -> dict[str, float]:
-    low, high = BOUNDS[name]
-    return {"at_least": low, "at_most": high}
+_Friction = Annotated[float, partial(number, at_least=0.01, at_most=10.0)]
+_Mass = Annotated[float, partial(number, at_least=0.05, at_most=10.0)]
+_Gain = Annotated[float, partial(number, at_least=0.05, at_most=5.0)]
+_Loss = Annotated[float, partial(number, at_least=0.05, at_most=10.0)]
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -62,11 +57,16 @@ class Variation(Checked):
         ValueError: If a number is out of these bounds.
     """
 
-    friction: Annotated[float, partial(number, **_between("friction"))] = 1.0
-    mass: Annotated[float, partial(number, **_between("mass"))] = 1.0
-    tca_gain: Annotated[float, partial(number, **_between("tca_gain"))] = 1.0
-    heat_loss: Annotated[float, partial(number, **_between("heat_loss"))] = 1.0
-    ambient: Annotated[float, partial(number, unit="°C", **_between("ambient"))] = AMBIENT
+    friction: _Friction = 1.0
+    mass: _Mass = 1.0
+    tca_gain: _Gain = 1.0
+    heat_loss: _Loss = 1.0
+    ambient: Ambient = AMBIENT
+
+    @classmethod
+    def bounds(cls, name: str) -> tuple[float, float]:
+        """Least and largest value of a field."""
+        return bounds(get_type_hints(cls, include_extras=True)[name])
 
     @classmethod
     def names(cls) -> tuple[str, ...]:

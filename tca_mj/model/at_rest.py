@@ -19,7 +19,7 @@ from tca_mj.model.tendon import lay_tca, route_passes
 from tca_mj.rod.beam import BeamSpec
 from tca_mj.rod.problem import Segment, StaticProblem, StrandLaw
 from tca_mj.rod.shape import RodShape
-from tca_mj.routes import Route
+from tca_mj.routes import AnyRoute
 from tca_mj.tca import CATALOGUE
 
 # Pseudo-time: a step in units of L² sqrt(line density / EI), about half the period of the first
@@ -51,7 +51,7 @@ class NotSettledError(ArithmeticError):
 @door
 def settle(
     beam: BeamSpec,
-    routes: Sequence[Route],
+    routes: Sequence[AnyRoute],
     tensions: Sequence[float | StrandLaw],
     *,
     nodes: Nodes,

@@ -13,17 +13,17 @@ joints; ``tca_mj.model.smooth`` does it.
 
 from __future__ import annotations
 
-import reprlib
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Annotated, Any
 
 import mujoco
 import numpy as np
 
 from tca_mj.actuation import Muscle
-from tca_mj.checks import Array, Checked, door
+from tca_mj.checks import Array, Checked, by_type, door, shown
 from tca_mj.model.chain import Chain, Motion
-from tca_mj.routes import Helix, Route, leg_length, require_route
+from tca_mj.routes import AnyRoute, Helix, leg_length
 from tca_mj.tca import TcaSpec
 
 
@@ -43,6 +43,19 @@ class Pass(Checked):
     chain: Chain
     leg: Helix
     down: bool = False
+
+
+def _passes(name: str, value: Any) -> Any:
+    if not isinstance(value, Sequence) or not all(isinstance(each, Pass) for each in value):
+        raise ValueError(
+            f"{name} must be those of route_passes(chain, route), got {shown(value)}"
+        )
+    return value
+
+
+Passes = Annotated[Sequence[Pass], _passes]
+AnyMuscle = Annotated[TcaSpec, by_type(TcaSpec | Muscle)]
+"""A TCA, or a muscle of another kind, which type checkers take for one."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,7 +108,7 @@ class RoutedTca:
 
 
 @door
-def route_passes(chain: Chain, route: Route) -> tuple[Pass, ...]:
+def route_passes(chain: Chain, route: AnyRoute) -> tuple[Pass, ...]:
     """The passes of a route through one chain: up along the first leg, down the second, ...
 
     Args:
@@ -105,15 +118,14 @@ def route_passes(chain: Chain, route: Route) -> tuple[Pass, ...]:
     Raises:
         ValueError: If it is no route.
     """
-    legs = require_route("route", route).legs
-    return tuple(Pass(chain, leg, down=bool(i % 2)) for i, leg in enumerate(legs))
+    return tuple(Pass(chain, leg, down=bool(i % 2)) for i, leg in enumerate(route.legs))
 
 
 @door
 def route_tca(
     spec: mujoco.MjSpec,
-    tca: TcaSpec | Muscle,
-    passes: Sequence[Pass],
+    tca: AnyMuscle,
+    passes: Passes,
     *,
     name: str,
     stretch: float = 0.0,
@@ -171,7 +183,7 @@ def route_tca(
 
 @door
 def lay_tca(
-    spec: mujoco.MjSpec, tca: TcaSpec | Muscle, passes: Sequence[Pass], *, name: str,
+    spec: mujoco.MjSpec, tca: AnyMuscle, passes: Passes, *, name: str,
     ideal: bool = False,
 ) -> RoutedTca:  # fmt: skip
     """``route_tca`` of a TCA cut to the length of its passes, which raises the errors.
@@ -187,7 +199,7 @@ def lay_tca(
 
 
 @door
-def path_length(passes: Sequence[Pass]) -> float:
+def path_length(passes: Passes) -> float:
     """Length of a route in the unloaded bodies [m].
 
     Args:
@@ -196,10 +208,6 @@ def path_length(passes: Sequence[Pass]) -> float:
     Raises:
         ValueError: If it has no leg, or is no passes.
     """
-    if not (isinstance(passes, Sequence) and all(isinstance(each, Pass) for each in passes)):
-        raise ValueError(
-            f"passes must be those of route_passes(chain, route), got {reprlib.repr(passes)}"
-        )
     if not passes:
         raise ValueError("passes must name at least one leg, got none")
     return sum(leg_length(p.leg, p.chain.beam.length, p.chain.beam.curvature) for p in passes)

@@ -37,7 +37,6 @@ def silicone_cylinder(
     )  # fmt: skip
 
 
-@door
 def straight_module(
     name: str, body: BeamSpec, nodes: Nodes, tca: TcaSpec, routes: Mapping[str, Route]
 ) -> Part:

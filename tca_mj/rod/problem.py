@@ -14,7 +14,7 @@ from tca_mj.checks import Checked, NotNegative, number, within
 from tca_mj.rod.beam import BeamSpec
 from tca_mj.rod.errors import RodSolveError
 from tca_mj.rod.lie import matrix_quaternion
-from tca_mj.routes import Route, require_route
+from tca_mj.routes import AnyRoute, require_route
 
 _PROBES = (np.arange(512) + 0.5) / 512  # where a leg of a route is tried
 _OFF = 0.1  # part of a leg's way in the section by which its slope may miss it at the probes
@@ -50,7 +50,7 @@ class Segment(Checked):
     """
 
     beam: BeamSpec
-    routes: Sequence[Route]
+    routes: Sequence[AnyRoute]
     tensions: Sequence[float | StrandLaw]
     _: KW_ONLY
     rotation: ArrayLike = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
@@ -60,8 +60,6 @@ class Segment(Checked):
 
     def __post_init__(self) -> None:
         Checked.__post_init__(self)
-        if not isinstance(self.beam, BeamSpec):
-            raise ValueError(f"beam must be a BeamSpec, got {self.beam!r}")
         object.__setattr__(self, "routes", _tuple("routes", self.routes))
         object.__setattr__(self, "tensions", _tuple("tensions", self.tensions))
         if len(self.tensions) != len(self.routes):

@@ -14,15 +14,16 @@ from tca_mj.rod.energy.solver import minimise
 from tca_mj.rod.problem import Segment, StaticProblem, StrandLaw
 from tca_mj.rod.shape import RodShape
 from tca_mj.rod.shooting.solver import solve
-from tca_mj.routes import Route
+from tca_mj.routes import AnyRoute
 
 SOLVERS = ("shooting", "energy")
 
 
 @door
 def solve_static(
-    beam: BeamSpec, routes: Sequence[Route], tensions: Sequence[float | StrandLaw], **options: Any
-) -> RodShape:
+    beam: BeamSpec, routes: Sequence[AnyRoute], tensions: Sequence[float | StrandLaw],
+    **options: Any,
+) -> RodShape:  # fmt: skip
     """Static shape of a clamped soft body with strands on arbitrary routes, by rod theory.
 
     Args:
