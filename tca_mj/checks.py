@@ -161,6 +161,14 @@ def limits(name: str, values: Any, *, above: float = -math.inf) -> float | Array
     return array if array.ndim else float(array)
 
 
+def edge(name: str, value: Any) -> float:
+    """One number or infinity, of either sign; ValueError if it is neither."""
+    array = floats(name, value)
+    if array.shape != () or math.isnan(array):
+        raise ValueError(f"{name} must be one number or infinity, got {shown(value)}")
+    return float(array)
+
+
 def row(name: str, values: Any, **bounds: Any) -> tuple[float, ...]:
     """Numbers in a row within bounds, which are those of ``within``; errors as there."""
     if isinstance(values, str | Mapping) or np.ndim(array := within(name, values, **bounds)) != 1:
@@ -251,6 +259,7 @@ Seed = Annotated[int, partial(whole, at_least=0)]
 Triple = Annotated[tuple[float, float, float], partial(row, shape=(3,))]
 Positives = Annotated[float | Array, partial(numbers, above=0.0)]
 NotNegatives = Annotated[float | Array, partial(numbers, at_least=0.0)]
+Edge = Annotated[float, edge]
 Limits = Annotated[float | Array, partial(limits, above=0.0)]
 # Array-likes, which are arrays behind the door.
 Numbers = Annotated[Any, within]
