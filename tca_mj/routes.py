@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import reprlib
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Annotated, Any, Protocol
 
@@ -81,6 +81,11 @@ class Helix(Checked):
         rate = 2.0 * np.pi * self.turns
         angle = self.phase + rate * s
         return self.radius * rate * np.stack([-np.sin(angle), np.cos(angle)], axis=-1)
+
+    def between(self, start: float, end: float) -> Helix:
+        """The part of it from ``start`` to ``end`` in [0, 1], for a body of that part's length."""
+        phase = self.phase + 2.0 * np.pi * self.turns * start
+        return replace(self, turns=self.turns * (end - start), phase=phase)
 
 
 @dataclass(frozen=True, slots=True)

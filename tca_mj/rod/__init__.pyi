@@ -1,10 +1,10 @@
 from tca_mj.rod.beam import BeamSpec, Outline, torsion_constant
 from tca_mj.rod.errors import RodSolveError
 from tca_mj.rod.problem import Segment, StrandLaw
-from tca_mj.rod.shape import RodShape
+from tca_mj.rod.shape import RodShape, bend
 from tca_mj.rod.static import solve_series, solve_static
 
 __all__ = [
-    "BeamSpec", "Outline", "RodShape", "RodSolveError", "Segment", "StrandLaw", "solve_series",
-    "solve_static", "torsion_constant",
+    "BeamSpec", "Outline", "RodShape", "RodSolveError", "Segment", "StrandLaw", "bend",
+    "solve_series", "solve_static", "torsion_constant",
 ]  # fmt: skip

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import KW_ONLY, dataclass
+from collections.abc import Hashable, Sequence
+from dataclasses import KW_ONLY, dataclass, field
+from numbers import Integral
 from typing import Any, Protocol
 
 import numpy as np
@@ -32,21 +33,27 @@ class StrandLaw(Protocol):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Segment(Checked):
-    """One module of a series: a soft body, its strands and what is rigid at its two ends.
+    """One soft body of several, its strands and what is rigid at its two ends.
 
     Attributes:
         beam: The body, with the base's z axis along its centre line.
         routes: Routes of the k strands, which are weightless.
         tensions: For each of them its tension, at least 0 [N], or its law.
-        rotation: Axes of the base, as columns, in the frame of the previous segment's tip (of the
-            world for the first segment), shape (3, 3) [1].
+        rotation: Axes of the base, as columns, in the frame of the tip that it stands on (of the
+            world if it stands there), shape (3, 3) [1].
         offset: Position of the base in that frame, shape (3,) [m].
         mass: Rigid mass at the tip [kg].
         centre: Centre of that mass in the tip's frame, shape (3,) [m].
+        strands: Names of the strands, all different. Routes of the same name in several segments
+            are one strand, with one tension, whose law is asked for the length of all of them.
+            None if every route is a strand of its own.
+        base: Number of the segment on whose tip it stands, -1 for the world; None for the segment
+            before it, and the world for the first.
 
     Raises:
         ValueError: If a shape is wrong, a number not finite, a tension or mass negative, the
-            rotation no rotation, or a route has no legs of the expected form.
+            rotation no rotation, a route has no legs of the expected form, or a strand's name comes
+            twice.
     """
 
     beam: BeamSpec
@@ -57,6 +64,8 @@ class Segment(Checked):
     offset: ArrayLike = (0.0, 0.0, 0.0)
     mass: NotNegative = 0.0
     centre: ArrayLike = (0.0, 0.0, 0.0)
+    strands: Sequence[Hashable] | None = None
+    base: int | None = None
 
     def __post_init__(self) -> None:
         Checked.__post_init__(self)
@@ -71,6 +80,13 @@ class Segment(Checked):
                 number(f"tensions[{i}]", tension, at_least=0.0, unit="N")
         for i, route in enumerate(self.routes):
             _require_legs(f"routes[{i}]", route)
+        if self.strands is not None:
+            object.__setattr__(self, "strands", _tuple("strands", self.strands))
+            if not len(self.routes) == len(self.strands) == len(set(self.strands)):
+                raise ValueError(
+                    f"strands must be {len(self.routes)} different names, one per route, got"
+                    f" {self.strands}"
+                )
         _keep(self, (3, 3), "rotation")
         matrix_quaternion(self.rotation)  # raises unless it is a rotation
         _keep(self, (3,), "offset", "centre")
@@ -78,18 +94,22 @@ class Segment(Checked):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class StaticProblem:
-    """Segments in series, the first one clamped to the world, under dead loads.
+    """Segments on each other, the first one clamped to the world, under dead loads.
 
     Attributes:
-        segments: At least one, from base to tip.
+        segments: At least one, each after that which it stands on.
         tip_force: Force on the last segment's tip, world frame, shape (3,) [N].
         tip_moment: Moment on it, world frame, shape (3,) [N m].
         gravity: Acceleration of gravity, world frame, shape (3,) [m/s²]. It acts on the bodies'
             line densities and the rigid masses.
         shearable: Whether sections shear; without, the linear strain is (0, 0, v3).
+        bases: Number of the segment that each stands on, -1 for the world.
+        strands: Numbers of the strands of each segment, counted in the order of the segments.
+        tensions: Tension or law of each strand, in the order of their numbers.
 
     Raises:
-        ValueError: If there is no segment, a shape is wrong or a number not finite.
+        ValueError: If there is no segment, a shape is wrong or a number not finite, a segment
+            stands on none before it, or a strand has two tensions.
     """
 
     segments: Sequence[Segment]
@@ -97,6 +117,9 @@ class StaticProblem:
     tip_moment: ArrayLike = (0.0, 0.0, 0.0)
     gravity: ArrayLike = (0.0, 0.0, 0.0)
     shearable: bool = True
+    bases: tuple[int, ...] = field(init=False)
+    strands: tuple[tuple[int, ...], ...] = field(init=False)
+    tensions: tuple[float | StrandLaw, ...] = field(init=False)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "segments", _tuple("segments", self.segments))
@@ -105,6 +128,31 @@ class StaticProblem:
         _keep(self, (3,), "tip_force", "tip_moment", "gravity")
         if not isinstance(self.shearable, bool | np.bool_):
             raise ValueError(f"shearable must be True or False, got {self.shearable!r}")
+        bases = tuple(i - 1 if s.base is None else s.base for i, s in enumerate(self.segments))
+        for i, base in enumerate(bases):
+            if not isinstance(base, Integral) or not -1 <= base < i:
+                raise ValueError(
+                    f"base of segments[{i}] must be None, or a whole number from -1 to {i - 1},"
+                    f" got {base!r}"
+                )
+        known: dict[Hashable, int] = {}
+        tensions: list[float | StrandLaw] = []
+        for i, segment in enumerate(self.segments):
+            for strand, tension in zip(_names(i, segment), segment.tensions, strict=True):
+                first = known.setdefault(strand, len(known))
+                if first == len(tensions):
+                    tensions.append(tension)
+                elif tension is not tensions[first] and tension != tensions[first]:
+                    raise ValueError(
+                        f"tensions of the strand {strand!r} must be one in all segments, got"
+                        f" {tensions[first]!r} and {tension!r}"
+                    )
+        strands = tuple(
+            tuple(known[strand] for strand in _names(i, segment))
+            for i, segment in enumerate(self.segments)
+        )
+        for name, value in (("bases", bases), ("strands", strands), ("tensions", tuple(tensions))):
+            object.__setattr__(self, name, value)
 
 
 def asked(strand: int, law: float | StrandLaw, length: float) -> tuple[float, float]:
@@ -129,6 +177,13 @@ def asked(strand: int, law: float | StrandLaw, length: float) -> tuple[float, fl
     )
 
 
+def _names(i: int, segment: Segment) -> Sequence[Hashable]:
+    """Names of the strands of segment i; a strand without one has one that no other has."""
+    if segment.strands is not None:
+        return segment.strands
+    return [("strand", i, j) for j in range(len(segment.routes))]
+
+
 def _tuple(field: str, values: Any) -> tuple[Any, ...]:
     try:
         return tuple(values)
@@ -138,10 +193,10 @@ def _tuple(field: str, values: Any) -> tuple[Any, ...]:
 
 def _keep(spec: Segment | StaticProblem, shape: tuple[int, ...], *fields: str) -> None:
     """Makes fields read-only arrays of finite numbers."""
-    for field in fields:
-        array = within(field, getattr(spec, field), shape=shape).copy()
+    for name in fields:
+        array = within(name, getattr(spec, name), shape=shape).copy()
         array.flags.writeable = False
-        object.__setattr__(spec, field, array)
+        object.__setattr__(spec, name, array)
 
 
 def _require_legs(field: str, route: Any) -> None:

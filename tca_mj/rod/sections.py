@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 from tca_mj.checks import Array
 from tca_mj.rod.errors import RodSolveError
 from tca_mj.rod.lie import hat
-from tca_mj.rod.problem import Segment
+from tca_mj.rod.problem import StaticProblem
 
 _STRAIN_STEPS = 50
 _CONVERGED = 1e-8  # last step of a strain, over 1/length for curvatures; it converges squarely
@@ -150,21 +150,21 @@ class Sections:
         return stiff
 
 
-def place(segments: Sequence[Segment], k: int, at: ArrayLike) -> Sections:
-    """Sections of one of the segments in series, whose strands are numbered from base to tip.
+def place(problem: StaticProblem, k: int, at: ArrayLike) -> Sections:
+    """Sections of one of the segments of a problem.
 
     Args:
-        segments: All segments.
+        problem: All segments, and the numbers of their strands.
         k: Which of them.
         at: Where, from 0 at its base to 1 at its tip, shape (P,).
     """
     s = np.asarray(at, dtype=np.float64)
-    segment, beam = segments[k], segments[k].beam
-    strands = [len(each.routes) for each in segments]
-    legs = max(sum(len(tuple(route.legs)) for route in each.routes) for each in segments)
+    segment = problem.segments[k]
+    beam = segment.beam
+    legs = max(sum(len(tuple(route.legs)) for route in each.routes) for each in problem.segments)
     lever, slope = np.zeros((len(s), legs, 3)), np.zeros((len(s), legs, 3))
-    strand = np.full((len(s), legs), sum(strands))
-    numbered = enumerate(segment.routes, sum(strands[:k]))
+    strand = np.full((len(s), legs), len(problem.tensions))
+    numbered = zip(problem.strands[k], segment.routes, strict=True)
     own = [(i, leg) for i, route in numbered for leg in route.legs]
     for j, (i, leg) in enumerate(own):
         lever[:, j, :2] = leg.offset(s)

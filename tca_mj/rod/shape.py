@@ -8,6 +8,33 @@ import numpy as np
 
 from tca_mj.checks import Array
 
+_STRAIGHT = 1e-9  # what turns less bends in no plane [rad]
+
+
+def bend(axes: Array) -> float:
+    """Angle by which the last of the axes along a rod is turned from the first, beyond half a turn.
+
+    The angle between two axes ends at half a turn. Which of those that go on from there it is, the
+    way there tells: the axes seen in the plane in which they turn most.
+
+    Args:
+        axes: Unit vectors from base to tip, shape (n, 3), less than half a turn apart [1].
+
+    Returns:
+        The angle, never negative; of two axes at most π [rad].
+    """
+    first, last = axes[0], axes[-1]
+    angle = float(np.arctan2(np.linalg.norm(np.cross(first, last)), first @ last))
+    about = np.cross(axes[:-1], axes[1:]).sum(axis=0)
+    across = np.cross(about, first)
+    size = float(np.linalg.norm(across))
+    if size < _STRAIGHT:
+        return angle
+    seen = abs(float(np.unwrap(np.arctan2(axes @ across / size, axes @ first))[-1]))
+    turns = 2.0 * np.pi * np.round(np.array([seen - angle, seen + angle]) / (2.0 * np.pi))
+    choices = turns + np.array([angle, -angle])
+    return float(abs(choices[np.argmin(np.abs(choices - seen))]))
+
 
 @dataclass(frozen=True, kw_only=True, slots=True, eq=False)
 class RodShape:
@@ -42,9 +69,11 @@ class RodShape:
 
     @property
     def bend_angle(self) -> float:
-        """Angle between the tip's axis and the base's, 0 to π [rad]."""
-        base, tip = self.rotation[0, :, 2], self.rotation[-1, :, 2]
-        return float(np.arctan2(np.linalg.norm(np.cross(base, tip)), base @ tip))
+        """Angle by which the tip's axis is turned from the base's [rad].
+
+        It goes on beyond half a turn where there are points enough to tell, see ``bend``.
+        """
+        return bend(self.rotation[:, :, 2])
 
     @property
     def twist_angle(self) -> float:

@@ -65,7 +65,7 @@ def solve_series(
     shearable: bool = True,
     points: Annotated[int, partial(whole, at_least=2, at_most=10_000)] = 65,
 ) -> tuple[RodShape, ...]:
-    """Static shapes of soft bodies in series, each on the tip of the one before.
+    """Static shapes of soft bodies in series, each on the tip of the one before, or in a tree.
 
     The exact theory of a Cosserat rod (bending, twist, shear and stretch of any size, linear
     elastic in them), whose strands slide without friction on their routes and are fixed at the
@@ -73,25 +73,33 @@ def solve_series(
     that continues the unloaded bodies when loads and tensions grow together.
 
     Args:
-        segments: The bodies from base to tip, with what is rigid between them.
+        segments: The bodies from base to tip, with what is rigid between them. Where one stands
+            on another than the one before it (``Segment.base``) they are a tree.
         tip_force: Force on the last tip, world frame, shape (3,) [N].
         tip_moment: Moment on it, world frame, shape (3,) [N m].
         gravity: Acceleration of gravity, world frame, shape (3,) [m/s²].
         solver: "shooting", on the balance of sections, or "energy", the minimum of the total
-            energy over the motions of the sections. They share the section's energy, no more.
+            energy over the motions of the sections. They share the section's energy, no more. A
+            tree is for "energy" alone.
         shearable: Whether sections shear. Without, the rod still stretches: what a chain of
             hinges and slides is.
         points: Number of points of each segment, at equal distances, 2 to 10 000. It has no
             influence on accuracy.
 
     Returns:
-        One shape per segment, all in the world's frame. ``base_force`` and ``base_moment`` are
-        what holds the base of that segment, the moment about the world's origin.
+        One shape per segment, all in the world's frame. ``tca_length`` is what of a strand lies in
+        that segment. ``base_force`` and ``base_moment`` are what holds the base of that segment,
+        the moment about the world's origin.
 
     Raises:
-        ValueError: If an argument has a wrong shape, is not finite, or a tension is negative.
+        ValueError: If an argument has a wrong shape, is not finite, a tension is negative, or the
+            solver is not for a tree.
         RodSolveError: If no state is found, with what is left of the equations.
     """
     require_one_of("solver", solver, SOLVERS)
     problem = StaticProblem(segments, tip_force, tip_moment, gravity, shearable)
-    return (minimise if solver == "energy" else solve)(problem, points)
+    if solver == "energy":
+        return minimise(problem, points)
+    if problem.bases != tuple(range(-1, len(problem.segments) - 1)):
+        raise ValueError(f"solver must be 'energy' where segments branch, got {solver!r}")
+    return solve(problem, points)

@@ -9,6 +9,9 @@ U_a' = tension, with the length of a strand l_a = sum over its legs of the integ
 w = v + u x r + r' at the offset r. A moment on the tip that is fixed in the world has no energy;
 its virtual work has a derivative, the antisymmetric part of which tells so.
 
+Bodies that branch are a tree. Every way through it, from the clamp to a tip, is one *line*, a rod
+of its own; of the masses that lines share, one line counts each, so that the works add up.
+
 The strains are polynomials on pieces of the rod, given at Gauss's points, which are those of the
 integrals too: the elastic part of the Hessian is one small block for each point, and the work of
 the loads has gradient and Hessian in closed form (``tca_mj.rod.energy.motion``).
@@ -36,17 +39,55 @@ _TURN = 6.0  # of a piece [rad]: below, the points integrate a constant strain t
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
+class Line:
+    """One way from the clamp to a tip, over k pieces.
+
+    Attributes:
+        segments: Its segments, from the clamp.
+        pieces: Numbers of its pieces, shape (k,).
+        density: What it counts of their mass per length, shape (k,).
+        joint: What is rigid before each, as factors of G, shape (k, 5, 5).
+        end: What is rigid behind the last one, shape (5, 5).
+        loaded: 1 if the load on the tip acts on its own, else 0.
+    """
+
+    segments: tuple[int, ...]
+    pieces: NDArray[np.intp]
+    density: Array
+    joint: Array
+    end: Array
+    loaded: float
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Course:
+    """A line at given strains.
+
+    Attributes:
+        pieces: Motions over its pieces.
+        before: G at the start of the pieces, shape (k, 5, 5).
+        after: What follows on the end of the pieces up to the tip, shape (k, 5, 5).
+        tip: G at the tip.
+        pull: Derivative of the loads' work by G at the tip, shape (5, 5).
+        work: Work of force and gravity.
+    """
+
+    pieces: Pieces
+    before: Array
+    after: Array
+    tip: Array
+    pull: Array
+    work: float
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
 class State:
-    """The rod at given strains, n pieces of q points with m strains each.
+    """The rods at given strains, n pieces of q points with m strains each.
 
     Attributes:
         strain: The strains, shape (n, q, m).
         factor: Part of the load that acts.
-        pieces: Motions over the pieces.
-        before: G at the start of the pieces, shape (n, 5, 5).
-        after: What follows on the end of the pieces up to the tip, shape (n, 5, 5).
-        tip: G at the tip.
-        pull: Derivative of the loads' work by G at the tip, shape (5, 5).
+        courses: Of the lines; the last one ends at the tip of the last segment.
         elastic: Energy of the bodies.
         work: Work of force and gravity.
         length: Lengths of the strands, shape (k,).
@@ -60,11 +101,7 @@ class State:
 
     strain: Array
     factor: float
-    pieces: Pieces
-    before: Array
-    after: Array
-    tip: Array
-    pull: Array
+    courses: tuple[Course, ...]
     elastic: float
     work: float
     length: Array
@@ -99,8 +136,8 @@ class Potential:
         owner = mesh.owner
         self._span = mesh.part * np.array([beam.length for beam in beams])[owner] / self._size
         self._weight = self._span[:, None] * self._rule.weight
-        self._laws = [law for segment in segments for law in segment.tensions]
-        parts = [place(segments, k, mesh.points(k).ravel()) for k in range(len(segments))]
+        self._laws = problem.tensions
+        parts = [place(problem, k, mesh.points(k).ravel()) for k in range(len(segments))]
         self._sections = Sections.joined(parts).scaled(self._size, self._force)
         shape = len(owner), POINTS, 6
         self._stiffness = self._sections.stiffness.reshape(shape)[..., self._active]
@@ -110,13 +147,32 @@ class Potential:
         self.metric = self._weight[..., None] * self._stiffness
         self._moment = np.asarray(problem.tip_moment) / (self._force * self._size)
         self.conservative = not self._moment.any()
-        # What is rigid between the pieces, and at the tip.
-        self._joint = np.tile(np.eye(5), (len(owner), 1, 1))
-        self._end = np.eye(5)
-        for index, segment in enumerate(segments):
+        counted: set[int] = set()
+        self._lines = []
+        for tip in range(len(segments)):
+            if tip not in problem.bases:
+                self._lines.append(self._line(tip, counted))
+                counted |= set(self._lines[-1].segments)
+
+    def _line(self, tip: int, counted: set[int]) -> Line:
+        """The line to the tip of a segment, without the masses of segments that are counted."""
+        way = [tip]
+        while (base := self._problem.bases[way[0]]) >= 0:
+            way.insert(0, base)
+        owner = self.mesh.owner
+        pieces = np.concatenate([np.flatnonzero(owner == index) for index in way])
+        joint, end = np.tile(np.eye(5), (len(pieces), 1, 1)), np.eye(5)
+        for index in way:
+            segment, share = self._segments[index], float(index not in counted)
             turn = rigid(segment.rotation, np.asarray(segment.offset) / self._size)
-            self._joint[np.argmax(owner == index)] = self._end @ turn
-            self._end = lump(segment.mass / self._force, np.asarray(segment.centre) / self._size)
+            joint[np.argmax(owner[pieces] == index)] = end @ turn
+            mass = share * segment.mass / self._force
+            end = lump(mass, np.asarray(segment.centre) / self._size)
+        fresh = ~np.isin(owner[pieces], list(counted))
+        return Line(
+            segments=tuple(way), pieces=pieces, density=np.where(fresh, self._density[pieces], 0.0),
+            joint=joint, end=end, loaded=float(tip == len(self._segments) - 1),
+        )  # fmt: skip
 
     def rough(self, strain: Array) -> NDArray[np.bool_]:
         """Pieces that are too long for these strains, shape (n,)."""
@@ -133,25 +189,7 @@ class Potential:
     def at(self, strain: Array, factor: float) -> State:
         """Energy, and all that its derivatives need, under a part of the loads and tensions."""
         xi = self._full(strain)
-        pieces = Pieces.of(self._rule, self._span, xi, self._density)
-        n = len(self._span)
-        before, after = np.empty((n, 5, 5)), np.empty((n, 5, 5))
-        tip, follow = np.eye(5), self._end
-        for i in range(n):
-            before[i] = tip @ self._joint[i]
-            tip = before[i] @ pieces.motion[i]
-        tip = tip @ self._end
-        for i in reversed(range(n)):
-            after[i] = follow
-            follow = self._joint[i] @ pieces.motion[i] @ follow
-
-        load = np.zeros((5, 5))
-        load[:3, 3] = factor * np.asarray(self._problem.tip_force) / self._force
-        load[:3, 4] = factor * np.asarray(self._problem.gravity)
-        pull = load.copy()
-        # A turn w of the tip changes R by w x R; the product with this is w . moment.
-        pull[:3, :3] = 0.5 * hat(factor * self._moment) @ tip[:3, :3]
-
+        courses = tuple(self._course(line, xi[line.pieces], factor) for line in self._lines)
         sections, count, shape = self._sections, len(self._laws), strain.shape
         density, tangent = sections.directions(xi.reshape(-1, 6))
         length = sections.lengths(density, self._weight, count + 1)[:count]
@@ -165,12 +203,36 @@ class Potential:
         excess = strain - self.unloaded
         stress = self._stiffness * excess
         return State(
-            strain=strain, factor=factor, pieces=pieces, before=before, after=after, tip=tip,
-            pull=pull, elastic=0.5 * float(np.sum(self._weight[..., None] * stress * excess)),
-            work=float(np.sum(load * tip)), length=length, tension=tension, stiffness=stiffness,
-            drawn=drawn, slope=stress + np.tensordot(tension, drawn, 1), bend=bend,
+            strain=strain, factor=factor, courses=courses,
+            elastic=0.5 * float(np.sum(self._weight[..., None] * stress * excess)),
+            work=sum(course.work for course in courses), length=length, tension=tension,
+            stiffness=stiffness, drawn=drawn, slope=stress + np.tensordot(tension, drawn, 1),
+            bend=bend,
             shortest=float(density[sections.strand < count].min(initial=1.0)),
         )  # fmt: skip
+
+    def _course(self, line: Line, xi: Array, factor: float) -> Course:
+        """A line at the strains of its points, shape (k, q, 6), under a part of the loads."""
+        pieces = Pieces.of(self._rule, self._span[line.pieces], xi, line.density)
+        n = len(xi)
+        before, after = np.empty((n, 5, 5)), np.empty((n, 5, 5))
+        tip, follow = np.eye(5), line.end
+        for i in range(n):
+            before[i] = tip @ line.joint[i]
+            tip = before[i] @ pieces.motion[i]
+        tip = tip @ line.end
+        for i in reversed(range(n)):
+            after[i] = follow
+            follow = line.joint[i] @ pieces.motion[i] @ follow
+
+        load = np.zeros((5, 5))
+        load[:3, 3] = line.loaded * factor * np.asarray(self._problem.tip_force) / self._force
+        load[:3, 4] = factor * np.asarray(self._problem.gravity)
+        pull = load.copy()
+        # A turn w of the tip changes R by w x R; the product with this is w . moment.
+        pull[:3, :3] = 0.5 * line.loaded * hat(factor * self._moment) @ tip[:3, :3]
+        return Course(pieces=pieces, before=before, after=after, tip=tip, pull=pull,
+                      work=float(np.sum(load * tip)))  # fmt: skip
 
     def change(self, old: State, new: State) -> float:
         """Energy of a state minus that of another one nearby, with a moment's work on the way.
@@ -180,21 +242,24 @@ class Potential:
         longer = new.length - old.length
         stored = 0.5 * longer @ (old.tension + new.tension)
         stored += longer * longer @ (old.stiffness - new.stiffness) / 12.0
-        turn = quaternion_log(matrix_quaternion(new.tip[:3, :3] @ old.tip[:3, :3].T))
+        now, before = new.courses[-1].tip[:3, :3], old.courses[-1].tip[:3, :3]
+        turn = quaternion_log(matrix_quaternion(now @ before.T))
         work = new.work - old.work + new.factor * self._moment @ turn
         return float(new.elastic - old.elastic + stored - work)
 
     def gradient(self, state: State) -> Array:
         """Derivative of the energy by the strains, shape (n, q, m)."""
-        ring = self._ring(state)[:, range(POINTS), range(POINTS)]
-        work = np.einsum("nqij,aji->nqa", ring, self._basis)
+        work = np.zeros_like(state.slope)
+        for line, course in zip(self._lines, state.courses, strict=True):
+            ring = self._ring(course)[:, range(POINTS), range(POINTS)]
+            work[line.pieces] += np.einsum("nqij,aji->nqa", ring, self._basis)
         return self._weight[..., None] * state.slope - work
 
-    def _ring(self, state: State) -> Array:
-        """T_q P^T S_r with P the derivative of the work by a piece's motion, (n, q, r, 5, 5)."""
-        transposed = state.after @ state.pull.T @ state.before
-        left = state.pieces.behind @ transposed[:, None]
-        return left[:, :, None] @ state.pieces.ahead[:, None]
+    def _ring(self, course: Course) -> Array:
+        """T_q P^T S_r with P the derivative of the work by a piece's motion, (k, q, r, 5, 5)."""
+        transposed = course.after @ course.pull.T @ course.before
+        left = course.pieces.behind @ transposed[:, None]
+        return left[:, :, None] @ course.pieces.ahead[:, None]
 
     def hessian(self, state: State) -> tuple[Array, Array]:
         """Second derivative of the energy, and what a moment adds to the gradient's derivative.
@@ -203,30 +268,41 @@ class Potential:
             A symmetric and an antisymmetric matrix, each (n q m) x (n q m).
         """
         n, q, m = state.strain.shape
-        pieces = state.pieces
-        # Points of two pieces, by the changes of G at the tip seen from the world.
-        ahead = state.before[:, None] @ pieces.ahead
-        behind = pieces.behind @ (state.after @ np.linalg.inv(state.tip))[:, None]
-        move = (ahead[:, :, None] @ self._basis @ behind[:, :, None]).reshape(n * q * m, 5, 5)
-        lever = np.swapaxes(move, 1, 2) @ (state.pull @ state.tip.T)
-        across = -lever.reshape(-1, 25) @ move.reshape(-1, 25).T
-        piece = np.repeat(np.arange(n), q * m)
-        across *= piece[:, None] < piece
-        hessian = across + across.T
-        # Points of one piece.
-        one = np.einsum("nqrij,ajk->nrqaik", self._ring(state), self._basis)
-        two = np.einsum("nrqkl,bli->nrqbik", pieces.between, self._basis)
-        within = one.reshape(n, q, q, m, 25) @ np.swapaxes(two.reshape(n, q, q, m, 25), -1, -2)
-        within = within.swapaxes(2, 3).reshape(n, q * m, q * m)
-        blocks, of = hessian.reshape(n, q * m, n, q * m), np.arange(n)
-        blocks[of, :, of, :] -= within + np.swapaxes(within, 1, 2)
+        hessian, twist = np.zeros((2, n * q * m, n * q * m))
+        for line, course in zip(self._lines, state.courses, strict=True):
+            place = (line.pieces[:, None] * q * m + np.arange(q * m)).ravel()
+            own, turn = self._curving(course, q, m)
+            hessian[place[:, None], place] += own
+            if line.loaded:
+                moment = hat(state.factor * self._moment)
+                twist[place[:, None], place] = -0.5 * turn @ moment @ turn.T
         # The bodies with strands of fixed tension, then the strands' stiffness.
         blocks, of = hessian.reshape(n * q, m, n * q, m), np.arange(n * q)
         blocks[of, :, of, :] += (self._weight[..., None, None] * state.bend).reshape(n * q, m, m)
         drawn = (self._weight[..., None] * state.drawn).reshape(len(self._laws), n * q * m)
         hessian += (drawn.T * state.stiffness) @ drawn
-        turn = np.stack([move[:, 2, 1], move[:, 0, 2], move[:, 1, 0]], axis=-1)
-        return hessian, -0.5 * turn @ hat(state.factor * self._moment) @ turn.T
+        return hessian, twist
+
+    def _curving(self, course: Course, q: int, m: int) -> tuple[Array, Array]:
+        """Minus the second derivative of the work on a line, and how its strains turn the tip."""
+        pieces, n = course.pieces, len(course.before)
+        # Points of two pieces, by the changes of G at the tip seen from the world.
+        ahead = course.before[:, None] @ pieces.ahead
+        behind = pieces.behind @ (course.after @ np.linalg.inv(course.tip))[:, None]
+        move = (ahead[:, :, None] @ self._basis @ behind[:, :, None]).reshape(n * q * m, 5, 5)
+        lever = np.swapaxes(move, 1, 2) @ (course.pull @ course.tip.T)
+        across = -lever.reshape(-1, 25) @ move.reshape(-1, 25).T
+        piece = np.repeat(np.arange(n), q * m)
+        across *= piece[:, None] < piece
+        hessian = across + across.T
+        # Points of one piece.
+        one = np.einsum("nqrij,ajk->nrqaik", self._ring(course), self._basis)
+        two = np.einsum("nrqkl,bli->nrqbik", pieces.between, self._basis)
+        within = one.reshape(n, q, q, m, 25) @ np.swapaxes(two.reshape(n, q, q, m, 25), -1, -2)
+        within = within.swapaxes(2, 3).reshape(n, q * m, q * m)
+        blocks, of = hessian.reshape(n, q * m, n, q * m), np.arange(n)
+        blocks[of, :, of, :] -= within + np.swapaxes(within, 1, 2)
+        return hessian, np.stack([move[:, 2, 1], move[:, 0, 2], move[:, 1, 0]], axis=-1)
 
     def distance(self, change: Array) -> float:
         """Turn and stretch of the whole rod in a change of its strains."""
@@ -234,32 +310,37 @@ class Potential:
 
     def shapes(self, state: State, points: int) -> tuple[RodShape, ...]:
         """One shape for each segment under the whole load, in SI units."""
-        force, gravity = np.asarray(self._problem.tip_force), np.asarray(self._problem.gravity)
-        moment = np.asarray(self._problem.tip_moment)
-        moment = moment + np.cross(state.tip[:3, 3] * self._size, force)
-        masses = np.array([segment.beam.mass + segment.mass for segment in self._segments])
         s = np.linspace(0.0, 1.0, points)
-        shapes, strand = [], 0
-        for index, segment in enumerate(self._segments):
-            piece, place = self.mesh.inside(index, s)
-            # From the start of its piece to each point.
-            known = self._rule.node
-            inner = lagrange(known, place[:, None] * known) @ state.strain[piece]
-            part = Pieces.of(
-                self._rule, place * self._span[piece], self._full(inner), self._density[piece]
-            )
-            frame = state.before[piece] @ part.motion
-            strain = self._full(self.mesh.at(state.strain, index, s))
-            strain[:, :3] /= self._size
-            own = slice(strand, strand + len(segment.routes))
-            strand = own.stop
-            beyond = (state.tip[:3, 4] - frame[0, :3, 4]) * self._force * self._size
-            shape = RodShape(
-                position=self._size * frame[:, :3, 3], rotation=frame[:, :3, :3].copy(),
-                arc_length=segment.beam.length * s, strain=strain,
-                tca_length=self._size * state.length[own],
-                base_force=0.0 - force - masses[index:].sum() * gravity,
-                base_moment=0.0 - moment - np.cross(beyond, gravity),
-            )  # fmt: skip
-            shapes.append(shape)
-        return tuple(shapes)
+        return tuple(self._shape(state, index, s) for index in range(len(self._segments)))
+
+    def _shape(self, state: State, index: int, s: Array) -> RodShape:
+        segment, problem, owner = self._segments[index], self._problem, self.mesh.owner
+        piece, place = self.mesh.inside(index, s)
+        # From the start of its piece to each point.
+        known = self._rule.node
+        inner = self._full(lagrange(known, place[:, None] * known) @ state.strain[piece])
+        strain = self._full(self.mesh.at(state.strain, index, s))
+        strain[:, :3] /= self._size
+        ways = zip(self._lines, state.courses, strict=True)
+        through = [(line, course) for line, course in ways if index in line.segments]
+        lever, masses = np.zeros(3), 0.0
+        for line, course in through:
+            mine = np.searchsorted(line.pieces, piece)
+            part = Pieces.of(self._rule, place * self._span[piece], inner, line.density[mine])
+            frame = course.before[mine] @ part.motion
+            lever += (course.tip[:3, 4] - frame[0, :3, 4]) * self._force * self._size
+            masses += float(course.tip[3, 4] - frame[0, 3, 4]) * self._force
+        lengths = self._sections.lengths(
+            self._sections.directions(self._full(state.strain).reshape(-1, 6))[0],
+            np.where((owner == index)[:, None], self._weight, 0.0), len(self._laws) + 1,
+        )  # fmt: skip
+        gravity, last = np.asarray(problem.gravity), through[-1]
+        force, moment = last[0].loaded * np.array([problem.tip_force, problem.tip_moment])
+        moment = moment + np.cross(last[1].tip[:3, 3] * self._size, force)
+        return RodShape(
+            position=self._size * frame[:, :3, 3], rotation=frame[:, :3, :3].copy(),
+            arc_length=segment.beam.length * s, strain=strain,
+            tca_length=self._size * lengths[list(problem.strands[index])],
+            base_force=0.0 - force - masses * gravity,
+            base_moment=0.0 - moment - np.cross(lever, gravity),
+        )  # fmt: skip

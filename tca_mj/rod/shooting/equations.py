@@ -165,9 +165,16 @@ class Mesh:
         tension[list(self.series.laws)] = state.tension
         return tension
 
-    def lengths(self, density: Array) -> Array:
-        """Lengths of all strands [m], and what belongs to none, from those of legs per length."""
+    def lengths(self, density: Array, only: int | None = None) -> Array:
+        """Lengths of all strands [m], and what belongs to none, from those of legs per length.
+
+        Args:
+            density: Those of the legs.
+            only: The segment in which they are asked for; None for all.
+        """
         weight = self.steps.length[:, None] * WEIGHTS
+        if only is not None:
+            weight = np.where((self.owner == only)[:, None], weight, 0.0)
         return self.steps.sections.lengths(density, weight, len(self.series.fixed))
 
     def look(self, state: State, share: float, drag: Array | None = None) -> Look:

@@ -20,7 +20,7 @@ _PROBES = np.linspace(0.0, 1.0, 129)  # where a route is looked at for its turns
 
 
 class Series:
-    """A problem, its strands numbered from base to tip, and the loads on its segments.
+    """A problem whose segments stand on each other in a row, and the loads on its segments.
 
     Attributes:
         segments: The bodies.
@@ -29,7 +29,7 @@ class Series:
         moment: Unit of moments, that of the softest bending [N m].
         fixed: Given tensions of all strands, 0 where there is a law, and of none as a last 0 [N].
         laws: Laws by the numbers of their strands.
-        first: Number of the first strand of each segment, and of none, (segments + 1,).
+        strands: Numbers of the strands of each segment.
         turns: Quaternion of each base in the frame before.
         base: Force of all loads beyond the base of each segment, world frame [N].
         tip: The same beyond a section just below its tip.
@@ -38,15 +38,15 @@ class Series:
     """
 
     def __init__(self, problem: StaticProblem) -> None:
+        self._problem = problem
         self.segments: tuple[Segment, ...] = tuple(problem.segments)
         self.shearable = problem.shearable
         self.reach = sum(segment.beam.length for segment in self.segments)
         self.moment = min(min(segment.beam.bending) for segment in self.segments) / self.reach
-        tensions = [tension for segment in self.segments for tension in segment.tensions]
+        tensions = problem.tensions
         self.laws = {i: t for i, t in enumerate(tensions) if callable(t)}
         self.fixed = np.array([0.0 if callable(t) else float(t) for t in [*tensions, 0.0]])
-        counts = [len(segment.routes) for segment in self.segments]
-        self.first = np.concatenate([[0], np.cumsum(counts)])
+        self.strands = problem.strands
         self.turns = [matrix_quaternion(segment.rotation) for segment in self.segments]
         gravity, load = np.asarray(problem.gravity), np.asarray(problem.tip_force)
         self.tip_moment = np.asarray(problem.tip_moment)
@@ -66,7 +66,7 @@ class Series:
 
     def sections(self, k: int, at: Array) -> Sections:
         """Sections of segment k, ``at`` from 0 to 1."""
-        return place(self.segments, k, at)
+        return place(self._problem, k, at)
 
     def force(self, k: int, at: Array) -> Array:
         """Force in these sections, world frame, shape (P, 3) [N]."""

@@ -192,7 +192,7 @@ def _nudged(frames: Array, way: int) -> Array:
 
 def _shapes(mesh: Mesh, state: State, look: Look, points: int) -> list[RodShape]:
     series, count = mesh.series, len(mesh.nodes)
-    lengths, tension = mesh.lengths(look.at.density), mesh.tensions(state, 1.0)
+    tension = mesh.tensions(state, 1.0)
     at = np.linspace(0.0, 1.0, points)
     # One short step of collocation leads from a node to each point: the polynomials of the steps
     # know the stages to fifth order, and one step of Newton's method squares what is left.
@@ -223,7 +223,7 @@ def _shapes(mesh: Mesh, state: State, look: Look, points: int) -> list[RodShape]
         shape = RodShape(
             position=base + nodes[within[k]] + walked[mine], rotation=rotation[mine],
             arc_length=segment.beam.length * at, strain=strain, base_force=hold,
-            tca_length=lengths[series.first[k] : series.first[k + 1]],
+            tca_length=mesh.lengths(look.at.density, k)[list(series.strands[k])],
             base_moment=moment + np.cross(base, hold),
         )  # fmt: skip
         shapes.append(shape)
