@@ -46,7 +46,7 @@ def export(
         ValueError: If the temperatures have the wrong shape or are below the surroundings'.
         SimulationDiverged: If there is no rest at them.
     """
-    own = Part(part.spec.copy(), part.tcas, dict(part.sites), part.spines)
+    own = part.copy()
     sim = Simulation(own)
     ambient = np.broadcast_to(sim.bank.heat.ambient, sim.n)
     if (sim.model.jnt_type == int(mujoco.mjtJoint.mjJNT_FREE)).any():

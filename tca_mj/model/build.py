@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
-import mujoco
+import math
+from collections.abc import Sequence
 
-from tca_mj.checks import door, instance, text
+import mujoco
+import numpy as np
+
+from tca_mj.checks import Array, door, instance, text
 from tca_mj.hints import nearest
 from tca_mj.model.chain import Chain
 from tca_mj.model.part import Part
@@ -13,11 +17,14 @@ from tca_mj.routes import Route
 from tca_mj.tca import CATALOGUE, TcaSpec
 
 VIEW = "view"  # the camera of a stage
+_ANGLE = 35.0  # from its lower to its upper edge [deg]
+_ROOM = 1.4  # what it sees over the part's size
+_NO_SIZE = 0.1  # size of a part in which nothing is seen [m]
 
 
 def add_tca(
     part: Part,
-    chain: Chain,
+    chain: Chain | Sequence[Chain],
     route: Route,
     tca: TcaSpec | str,
     *,
@@ -27,7 +34,8 @@ def add_tca(
 
     Args:
         part: The part, in whose specification the chain was built.
-        chain: The chain, as ``add_chain`` returns it.
+        chain: The chain, as ``add_chain`` returns it; or several, each standing on the one before,
+            which the route runs through as if they were one.
         route: Where it runs: ``Helix`` (with 0 turns a straight line), ``UTurn``, or one of
             ``parallel(...)``.
         tca: The kind of TCA, or its name in ``CATALOGUE``; its own length does not matter.
@@ -50,7 +58,10 @@ def add_tca(
         0.045
     """
     instance("part", part, Part)
-    instance("chain", chain, Chain)
+    if isinstance(chain, Chain):
+        chain = [chain]
+    for i, each in enumerate(chain):
+        instance("chain" if len(chain) == 1 else f"chain[{i}]", each, Chain)
     if isinstance(tca, str):
         if tca not in CATALOGUE:
             raise ValueError(
@@ -71,6 +82,8 @@ def add_tca(
 def stage(part: Part, *, floor: float | None = None) -> None:
     """Gives a bare part a sky, a light and the camera ``view``; a simulation does it by itself.
 
+    The camera looks along y at the middle of the part as it was built, with room to move.
+
     Args:
         part: The part, which has no light of its own.
         floor: Height of a floor, which carries what falls on it; None for none [m].
@@ -86,11 +99,27 @@ def stage(part: Part, *, floor: float | None = None) -> None:
     )
     spec.visual.headlight.ambient = [0.35, 0.35, 0.35]
     spec.visual.headlight.diffuse = [0.4, 0.4, 0.4]
+    middle, radius = _extent(spec)
+    away = _ROOM * radius / math.tan(math.radians(_ANGLE / 2.0))
     spec.worldbody.add_camera(
-        name=VIEW, pos=[0.0, -0.3, 0.06], xyaxes=[1.0, 0.0, 0.0, 0.0, 0.2, 1.0], fovy=35.0
-    )
+        name=VIEW, pos=(middle + away * np.array([0.0, -0.98, 0.2])).tolist(), fovy=_ANGLE,
+        xyaxes=[1.0, 0.0, 0.0, 0.0, 0.2, 0.98],
+    )  # fmt: skip
     if floor is not None:
         spec.worldbody.add_geom(
             name="stage.floor", type=mujoco.mjtGeom.mjGEOM_PLANE, size=[1.0, 1.0, 0.01],
             pos=[0.0, 0.0, floor], rgba=[0.8, 0.81, 0.83, 1.0], friction=[0.8, 0.002, 1e-4],
         )  # fmt: skip
+
+
+def _extent(spec: mujoco.MjSpec) -> tuple[Array, float]:
+    """Middle of all geoms that have an end, and the radius of a ball about it that holds them."""
+    model: mujoco.MjModel = spec.copy().compile()
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    ends = model.geom_rbound > 0.0
+    if not ends.any():
+        return np.zeros(3), _NO_SIZE
+    place, size = data.geom_xpos[ends], model.geom_rbound[ends, None]
+    low, high = (place - size).min(axis=0), (place + size).max(axis=0)
+    return (low + high) / 2.0, float(np.linalg.norm(high - low)) / 2.0

@@ -13,9 +13,9 @@ changed while the simulation runs, and MuJoCo 4 no longer has it.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Protocol
 
 import mujoco
 import numpy as np
@@ -52,6 +52,62 @@ Colour = Annotated[Sequence[float], partial(row, shape=(4,), at_least=0.0, at_mo
 Friction = Annotated[Sequence[float], partial(row, shape=(3,), at_least=0.0)]
 
 
+@dataclass(frozen=True, slots=True)
+class Member:
+    """What a built part remembers of a chain: which beam it stands for, and how it is cut.
+
+    Attributes:
+        name: Prefix of all names of the chain.
+        beam: The beam.
+        nodes: Number n of nodes.
+        motions: Which motions each node has.
+    """
+
+    name: str
+    beam: BeamSpec
+    nodes: int
+    motions: tuple[Motion, ...]
+
+    def renamed(self, prefix: str) -> Member:
+        """The same chain in a part whose names all got ``prefix`` in front."""
+        return replace(self, name=prefix + self.name)
+
+    @property
+    def cell(self) -> float:
+        """Length h of a cell [m]."""
+        return self.beam.length / self.nodes
+
+    @property
+    def piece(self) -> float:
+        """Length of a whole piece, see ``Chain`` [m]."""
+        half_turn = 0.5 * self.cell * float(np.linalg.norm(self.beam.curvature[:2]))
+        # Pieces of length h would put the nodes on a smaller circle than the beam's.
+        return self.cell if half_turn == 0.0 else self.cell * float(np.tan(half_turn)) / half_turn
+
+    def joints(self, node: int) -> dict[Motion, str]:
+        """Names of the joints of a node by their motion, from base to tip."""
+        order = self.motions if node % 2 == 0 else self.motions[::-1]
+        return {motion: f"{self.name}.{motion}{node}" for motion in order}
+
+    def body(self, piece: int) -> str:
+        """Name of the body of a piece."""
+        return f"{self.name}.piece{piece}"
+
+    def skin(self, piece: int) -> str:
+        """Name of the geom with its mass and surface."""
+        return f"{self.name}.skin{piece}"
+
+    def local(self, piece: int) -> float:
+        """z of the piece's point in the piece's own frame [m]."""
+        return 0.0 if piece == 0 else self.piece / 2.0
+
+
+class Holder(Protocol):
+    """What a chain is built into and remembered by; ``tca_mj.model.part.Part`` is one."""
+
+    spec: mujoco.MjSpec
+    chains: tuple[Member, ...]
+
 
 @dataclass(frozen=True, slots=True)
 class Chain:
@@ -85,6 +141,11 @@ class Chain:
         return len(self.joints)
 
     @property
+    def member(self) -> Member:
+        """What a part remembers of it."""
+        return Member(self.name, self.beam, self.nodes, self.motions)
+
+    @property
     def tip(self) -> mujoco.MjsBody:
         """The last piece; its frame sits at the last node, the tip is half a piece further."""
         return self.pieces[-1]
@@ -92,7 +153,7 @@ class Chain:
     def local(self, piece: int) -> float:
         """z of the piece's point in the piece's own frame [m]."""
         whole("piece", piece, at_least=0, at_most=self.nodes)
-        return 0.0 if piece == 0 else self.piece / 2.0
+        return self.member.local(piece)
 
     def extent(self, piece: int) -> float:
         """Length of a piece; the first and the last one are half as long as the others [m]."""
@@ -108,11 +169,12 @@ class Chain:
 
 @door
 def add_chain(
-    parent: mujoco.MjsBody,
+    parent: mujoco.MjsBody | Holder,
     spec: BeamSpec,
     *,
     nodes: Nodes,
     name: str,
+    on: Chain | mujoco.MjsBody | None = None,
     motions: Sequence[Motion] = MOTIONS,
     pos: Place = (0.0, 0.0, 0.0),
     quat: Quaternion = (1.0, 0.0, 0.0, 0.0),
@@ -120,13 +182,16 @@ def add_chain(
     friction: Friction = (1.0, 0.005, 0.0001),
     collide: bool = True,
 ) -> Chain:
-    """Adds a beam to ``parent``, its base at ``pos`` and its axis along the local z.
+    """Adds a beam to a part, its base at ``pos`` and its axis along the local z.
 
     Args:
-        parent: Body that holds the base.
+        parent: The part, which remembers the chain; or a body of its specification that holds the
+            base, and only the TCAs that are laid into the chain remember it.
         spec: The beam.
         nodes: Number of nodes, 1 to 128.
         name: Prefix of all names.
+        on: What it stands on in the part: a chain, at whose tip ``pos`` and ``quat`` begin, or a
+            body; None for the part's base.
         motions: Motions of each node; leave out those the part does not need.
         pos: Position of the base in the parent's frame [m].
         quat: Orientation of the base, wxyz.
@@ -139,7 +204,7 @@ def add_chain(
 
     Raises:
         ValueError: If there are no nodes or too few for the curvature, no motions, or an unknown
-            motion.
+            motion; if the part has a chain of that name, or ``on`` is given without a part.
 
     Example:
         >>> from tca_mj import Part, add_chain, new_spec
@@ -153,36 +218,53 @@ def add_chain(
     if not motions:
         raise ValueError(f"motions must be some of {MOTIONS}, got {motions}")
     kept: tuple[Motion, ...] = tuple(motion for motion in MOTIONS if motion in motions)
-    cell = spec.length / nodes
+    member = Member(name, spec, nodes, kept)
+    cell = member.cell
     half_turn = 0.5 * cell * float(np.linalg.norm(spec.curvature[:2]))
     if half_turn > 0.4 * np.pi:
         raise ValueError(f"nodes must be at least {int(np.ceil(nodes * half_turn / 0.4 / np.pi))}"
                          f" for the curvature {spec.curvature}, got {nodes}")  # fmt: skip
-    # Pieces of length h would put the nodes on a smaller circle than the beam's.
-    length = cell if half_turn == 0.0 else cell * float(np.tan(half_turn)) / half_turn
+    body, place = _place(parent, member, on, pos)
+    length = member.piece
     look = surface(friction, conaffinity=int(collide), rgba=list(rgba))
     mass = spec.mass / nodes
     stiffness = dict(zip(MOTIONS, (spec.stretching, *spec.bending, spec.torsion), strict=True))
 
-    piece = parent.add_body(name=f"{name}.piece0", pos=list(pos), quat=list(quat))
-    _add_skin(piece, f"{name}.skin0", length / 2.0, spec.outline, mass=0.5 * mass, **look)
+    piece = body.add_body(name=member.body(0), pos=place, quat=list(quat))
+    _add_skin(piece, member.skin(0), length / 2.0, spec.outline, mass=0.5 * mass, **look)
     pieces, joints = [piece], []
     for node in range(nodes):
         reach = length / 2.0 if node == 0 else length
-        piece = piece.add_body(name=f"{name}.piece{node + 1}", pos=[0.0, 0.0, reach])
-        order = kept if node % 2 == 0 else kept[::-1]
-        rest = _hinge_angles(cell * np.array(spec.curvature), reverse=order != kept)
-        names = {m: f"{name}.{m}{node}" for m in order}
-        for motion in order:
+        piece = piece.add_body(name=member.body(node + 1), pos=[0.0, 0.0, reach])
+        names = member.joints(node)
+        rest = _hinge_angles(cell * np.array(spec.curvature), reverse=tuple(names) != kept)
+        for motion, joint in names.items():
             spring = stiffness[motion] / cell
-            _add_joint(piece, names[motion], motion, spring, spec.damping_time, rest)
+            _add_joint(piece, joint, motion, spring, spec.damping_time, rest)
         joints.append(names)
         share = 1.0 if node < nodes - 1 else 0.5
-        skin = f"{name}.skin{node + 1}"
+        skin = member.skin(node + 1)
         _add_skin(piece, skin, share * length, spec.outline, mass=share * mass, **look)
         pieces.append(piece)
     points = np.linspace(0.0, spec.length, nodes + 1)
     return Chain(name, spec, cell, length, kept, tuple(pieces), points, tuple(joints))
+
+
+def _place(
+    parent: mujoco.MjsBody | Holder, member: Member, on: Any, pos: Sequence[float]
+) -> tuple[mujoco.MjsBody, list[float]]:
+    """The body that holds a chain, and where in it; a part remembers the chain."""
+    if isinstance(parent, mujoco.MjsBody):
+        if on is not None:
+            raise ValueError(f"on must be left out where parent is a body, got {on!r}")
+        return parent, list(pos)
+    known = [other.name for other in parent.chains]
+    if member.name in known:
+        raise ValueError(f"name must be new among the part's chains {known}, got {member.name!r}")
+    parent.chains = (*parent.chains, member)
+    if not isinstance(on, Chain):
+        return (parent.spec.worldbody if on is None else on), list(pos)
+    return on.tip, [pos[0], pos[1], pos[2] + on.local(on.nodes)]
 
 
 def _hinge_angles(turn: Array, *, reverse: bool) -> Array:

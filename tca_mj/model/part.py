@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from pathlib import Path
 
 import mujoco
+from numpy.typing import ArrayLike
 
 from tca_mj.checks import Checked, door
+from tca_mj.model.chain import Member
 from tca_mj.model.spine import RoutedSpine
 from tca_mj.model.tendon import RoutedTca
 
@@ -21,6 +24,7 @@ class Part(Checked):
         tcas: The TCAs in it, in the order of a simulation's actuator axis.
         sites: Names of sites with a meaning, for example ``tip``.
         spines: The shape-memory spines in it, in the order of a simulation's heater axis.
+        chains: What it remembers of its chains; those that TCAs run through may be left out.
 
     Raises:
         ValueError: If a field is something else.
@@ -36,6 +40,41 @@ class Part(Checked):
     tcas: tuple[RoutedTca, ...] = ()
     sites: dict[str, str] = field(default_factory=dict)
     spines: tuple[RoutedSpine, ...] = ()
+    chains: tuple[Member, ...] = ()
+
+    @property
+    def members(self) -> dict[str, Member]:
+        """All chains by name: those in ``chains``, and those that its TCAs run through."""
+        laid = (run.chain for tca in self.tcas for run in tca.runs)
+        return {member.name: member for member in (*self.chains, *laid)}
+
+    def copy(self) -> Part:
+        """A part like this one, with a specification of its own."""
+        return replace(self, spec=self.spec.copy(), sites=dict(self.sites))
+
+    def export(
+        self, path: str | Path | None = None, *, temperatures: ArrayLike | None = None
+    ) -> str:
+        """The part as MJCF for plain MuJoCo, its TCAs' law frozen: ``tca_mj.export`` of it.
+
+        The shape there is found by a simulation. That stands above this floor, and so it is not
+        imported but fetched by its name from the package's door, which knows what stands where.
+
+        Args:
+            path: The file; None to return the text only.
+            temperatures: Temperatures of the n TCAs, shape (n,), or one for all; None for those of
+                the surroundings [°C].
+
+        Returns:
+            The text of the file.
+
+        Raises:
+            ValueError, SimulationDiverged: As ``tca_mj.export``.
+        """
+        import tca_mj
+
+        text: str = tca_mj.export(self, path, temperatures=temperatures)
+        return text
 
     @door
     def attach(
@@ -67,6 +106,7 @@ class Part(Checked):
         self.spec.attach(child.spec, site=site, prefix=f"{prefix}.")
         self.tcas += tcas
         self.spines += spines
+        self.chains += tuple(chain.renamed(f"{prefix}.") for chain in child.chains)
         for key, value in child.sites.items():
             if names is None or key in names:
                 self.sites[f"{prefix}.{key}"] = f"{prefix}.{value}"

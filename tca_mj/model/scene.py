@@ -7,7 +7,9 @@ from pathlib import Path
 
 import mujoco
 
+from tca_mj.assets import mjcf
 from tca_mj.checks import door
+from tca_mj.model.chain import Place
 from tca_mj.model.part import Part, set_options
 
 
@@ -31,8 +33,9 @@ def load(path: str | Path) -> mujoco.MjSpec:
 
 @door
 def scene(
-    arena: str | Path, robot: Part, objects: Mapping[str, str | Path], *, name: str = "robot"
-) -> Part:
+    arena: str | Path, robot: Part, objects: Mapping[str, str | Path], *, name: str = "robot",
+    pos: Place = (0.0, 0.0, 0.0),
+) -> Part:  # fmt: skip
     """Puts a robot and objects into an arena.
 
     The robot's names get ``name`` and a dot in front, an object's names its key and a dot.
@@ -43,6 +46,7 @@ def scene(
         objects: MJCF files of the objects, by the name that each gets in the scene. Each file's
             bodies are put into the world where the file says.
         name: Name of the robot in the scene.
+        pos: Where its base is [m].
 
     Returns:
         The scene as a part, whose TCAs and named sites are the robot's.
@@ -51,7 +55,28 @@ def scene(
     set_options(spec)
     origin = spec.worldbody.add_site(name="origin", group=4)
     part = Part(spec)
-    part.attach(robot, to="origin", prefix=name)
+    place = "place" if any(pos) else "origin"
+    if any(pos):
+        spec.worldbody.add_site(name=place, pos=list(pos), group=4)
+    part.attach(robot, to=place, prefix=name)
     for key, path in objects.items():
         spec.attach(load(path), site=origin, prefix=f"{key}.")
     return part
+
+
+@door
+def in_arena(robot: Part, *, pos: Place = (0.0, 0.0, 0.1), name: str = "robot") -> Part:
+    """Puts a robot into the arena that comes with the package: a table, a light and cameras.
+
+    The table is at z = 0. The cameras ``front`` and ``side`` see what is within 6 cm of its middle,
+    and up to 14 cm above it.
+
+    Args:
+        robot: The robot, whose base is held; it is used up.
+        pos: Where its base is [m].
+        name: Its name; its names get that and a dot in front.
+
+    Returns:
+        The scene as a part.
+    """
+    return scene(mjcf("arena.xml"), robot, {}, name=name, pos=pos)

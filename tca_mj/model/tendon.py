@@ -13,6 +13,7 @@ joints; ``tca_mj.model.smooth`` does it.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Annotated, Any
@@ -22,7 +23,7 @@ import numpy as np
 
 from tca_mj.actuation import Muscle
 from tca_mj.checks import Array, Checked, by_type, door, shown
-from tca_mj.model.chain import Chain, Motion
+from tca_mj.model.chain import Chain, Member, Motion
 from tca_mj.routes import AnyRoute, Helix, leg_length
 from tca_mj.tca import TcaSpec
 
@@ -79,6 +80,23 @@ class Crossing:
 
 
 @dataclass(frozen=True, slots=True)
+class Run:
+    """What a routed TCA remembers of a pass.
+
+    Attributes:
+        chain: The chain.
+        leg: The leg, described from base to tip.
+        down: Whether the TCA follows it from tip to base.
+        mass: Mass of the TCA along it [kg].
+    """
+
+    chain: Member
+    leg: Helix
+    down: bool
+    mass: float
+
+
+@dataclass(frozen=True, slots=True)
 class RoutedTca:
     """A TCA in a built part.
 
@@ -89,6 +107,7 @@ class RoutedTca:
             rest length plus ``stretch``.
         stretch: Pre-stretch in the unloaded body, negative for a TCA with slack [m].
         crossings: The cells that it crosses, one by one.
+        runs: Its legs, one by one.
     """
 
     name: str
@@ -96,6 +115,7 @@ class RoutedTca:
     path_length: float
     stretch: float
     crossings: tuple[Crossing, ...]
+    runs: tuple[Run, ...]
 
     @door
     def renamed(self, prefix: str) -> RoutedTca:
@@ -104,21 +124,32 @@ class RoutedTca:
             replace(item, joints={motion: prefix + name for motion, name in item.joints.items()})
             for item in self.crossings
         )
-        return replace(self, name=prefix + self.name, crossings=crossings)
+        runs = tuple(replace(run, chain=run.chain.renamed(prefix)) for run in self.runs)
+        return replace(self, name=prefix + self.name, crossings=crossings, runs=runs)
 
 
 @door
-def route_passes(chain: Chain, route: AnyRoute) -> tuple[Pass, ...]:
-    """The passes of a route through one chain: up along the first leg, down the second, ...
+def route_passes(chains: Chain | Sequence[Chain], route: AnyRoute) -> tuple[Pass, ...]:
+    """The passes of a route: up along the first leg, down the second, ...
 
     Args:
-        chain: The chain.
+        chains: The chain; or several, each standing on the one before, to which the route is one
+            body, so that a helix has its turns over all of them.
         route: The route.
 
     Raises:
         ValueError: If it is no route.
     """
-    return tuple(Pass(chain, leg, down=bool(i % 2)) for i, leg in enumerate(route.legs))
+    if isinstance(chains, Chain):
+        return tuple(Pass(chains, leg, down=bool(i % 2)) for i, leg in enumerate(route.legs))
+    ends = np.cumsum([0.0, *(chain.beam.length for chain in chains)])
+    ends /= ends[-1] or 1.0
+    spans = list(zip(chains, ends, ends[1:], strict=False))
+    return tuple(
+        Pass(chain, leg.between(float(start), float(end)), down=bool(i % 2))
+        for i, leg in enumerate(route.legs)
+        for chain, start, end in (spans[::-1] if i % 2 else spans)
+    )
 
 
 @door
@@ -160,10 +191,16 @@ def route_tca(
     width = tca.outer_radius
     tendon = spec.add_tendon(name=name, width=width, rgba=[0.1, 0.2, 0.6, 1.0])
     crossings: list[Crossing] = []
-    for index, item in enumerate(passes):
+    whole = math.fsum(item.chain.beam.length for item in passes)
+    weight = 0.0 if ideal else tca.mass
+    runs = tuple(
+        Run(item.chain.member, item.leg, item.down, weight * (item.chain.beam.length / whole))
+        for item in passes
+    )
+    for index, (item, run) in enumerate(zip(passes, runs, strict=True)):
         if not ideal:
             _check_inside(item, name)
-            _add_mass(item, tca.mass / len(passes))
+            _add_mass(item, run.mass)
         offsets = _site_offsets(item)
         for number in range(len(offsets))[:: -1 if item.down else 1]:
             site = f"{name}.leg{index}.site{number}"
@@ -178,7 +215,7 @@ def route_tca(
         # Slack at zero; no real TCA comes near the other bound.
         forcelimited=1, forcerange=[-1e3, 0.0],
     )  # fmt: skip
-    return RoutedTca(name, tca, length, stretch, tuple(crossings))
+    return RoutedTca(name, tca, length, stretch, tuple(crossings), runs)
 
 
 @door
