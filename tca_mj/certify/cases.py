@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from tca_mj.certify.rest import Load, Rest, rest, run
-from tca_mj.certify.subjects import Limb, Subject, slack
+from tca_mj.certify.parts import Limb
+from tca_mj.certify.rest import Law, Load, Rest, rest, run
+from tca_mj.certify.subjects import Subject, slack
 from tca_mj.checks import Array
-from tca_mj.rod import RodShape, StrandLaw, solve_series
+from tca_mj.rod import RodShape, solve_series
+from tca_mj.rod.shape import bend
 from tca_mj.tca import law_at
 
 GRAVITY = 9.81  # [m/s²]
@@ -99,20 +100,22 @@ def _direction(rng: np.random.Generator) -> Array:
 
 
 def theory(
-    subject: Subject, case: Case, *, shearable: bool = False, solver: str = "shooting"
+    subject: Subject, case: Case, *, shearable: bool = False, solver: str | None = None
 ) -> Rest:
-    """What rod theory answers.
+    """What rod theory answers; errors as ``shapes``."""
+    return tips_of(subject, case, list(shapes(subject, case, shearable=shearable, solver=solver)))
 
-    Raises:
-        RodSolveError: If no state is found.
-    """
-    laws = _laws(subject, case)
+
+def tips_of(
+    subject: Subject, case: Case, found: Sequence[tuple[Limb, Sequence[RodShape]]]
+) -> Rest:
+    """The tips and the TCAs of shapes that theory has found."""
+    laws, tips = _laws(subject, case), []
     length = np.zeros(len(laws))
-    tips = []
-    for limb, shapes in _shapes(subject, case, shearable=shearable, solver=solver, points=2):
-        for shape, numbers in zip(shapes, limb.tcas, strict=True):
+    for limb, bodies in found:
+        for shape, numbers in zip(bodies, limb.tcas, strict=True):
             np.add.at(length, list(numbers), shape.tca_length)
-        tips.append(shapes[-1])
+        tips += [bodies[tip] for tip in limb.tips]
     return Rest(
         position=np.array([tip.tip for tip in tips]),
         rotation=np.array([tip.rotation[-1] for tip in tips]),
@@ -121,14 +124,29 @@ def theory(
     )
 
 
-def _shapes(
-    subject: Subject, case: Case, **how: Any
-) -> Iterator[tuple[Limb, Sequence[RodShape]]]:
-    """The limbs of a module and the shapes of their bodies by theory, solved as ``how`` says."""
-    for i, limb in enumerate(subject.limbs(_laws(subject, case))):
+def shapes(
+    subject: Subject, case: Case, *, shearable: bool = False, solver: str | None = None,
+    points: int = 17,
+) -> Iterator[tuple[Limb, Sequence[RodShape]]]:  # fmt: skip
+    """The limbs of a module and the shapes of their bodies by theory.
+
+    Args:
+        subject: The module.
+        case: The case.
+        shearable: As in ``solve_series``.
+        solver: The same; None for the subject's.
+        points: The same.
+
+    Raises:
+        RodSolveError: If no state is found.
+    """
+    tip = -1
+    for limb in subject.limbs(_laws(subject, case)):
+        tip += len(limb.tips)
         yield limb, solve_series(
-            limb.segments, tip_force=case.load.force[i], tip_moment=case.load.moment[i],
-            gravity=case.load.gravity, **how,
+            limb.segments, tip_force=case.load.force[tip], tip_moment=case.load.moment[tip],
+            gravity=case.load.gravity, shearable=shearable, solver=solver or subject.solver,
+            points=points,
         )  # fmt: skip
 
 
@@ -153,23 +171,25 @@ def at_rest(subject: Subject, case: Case, times: int = 1, *, near: str | None = 
 def _joints(subject: Subject, case: Case, times: int, solver: str) -> dict[str, float]:
     """Positions of the joints whose cells are strained as theory says in their middles."""
     joints = {}
-    for limb, shapes in _shapes(subject, case, shearable=False, solver=solver):
-        for shape, chain, default in zip(shapes, limb.chains, subject.nodes, strict=True):
-            nodes = times * default
+    for limb, bodies in shapes(subject, case, solver=solver, points=65):
+        for shape, chain, (start, end) in zip(bodies, limb.chains, limb.cells, strict=True):
+            nodes = times * (end - start)
             cell = shape.arc_length[-1] / nodes
             middles = cell * (np.arange(nodes) + 0.5)
             assert shape.strain is not None
             strain = np.array(
                 [np.interp(middles, shape.arc_length, column) for column in shape.strain.T]
             )
-            for node, turn in enumerate(cell * strain[:3].T):
+            for node, turn, stretch in zip(
+                range(times * start, times * end), cell * strain[:3].T, strain[5], strict=True
+            ):
                 # The order of the joints is mirrored from node to node.
                 order = "xyz" if node % 2 == 0 else "zyx"
                 angles = Rotation.from_rotvec(turn).as_euler(order.upper())
                 for axis, angle in zip(order, angles, strict=True):
                     motion = "twist" if axis == "z" else f"bend_{axis}"
                     joints[f"{chain}.{motion}{node}"] = float(angle)
-                joints[f"{chain}.stretch{node}"] = cell * float(strain[5, node] - 1.0)
+                joints[f"{chain}.stretch{node}"] = cell * float(stretch - 1.0)
     return joints
 
 
@@ -192,14 +212,29 @@ def gap(subject: Subject, found: Rest, exact: Rest) -> Gap:
     )
 
 
-def bent(subject: Subject, exact: Rest) -> float:
-    """Largest angle by which a tip's axis is turned from the unloaded shape [rad]."""
-    limbs = subject.limbs([slack] * len(subject.tcas))
-    starts = [solve_series(limb.segments, points=2)[-1].rotation[-1] for limb in limbs]
-    cosines = [float(a[:, 2] @ b[:, 2]) for a, b in zip(starts, exact.rotation, strict=True)]
-    return float(np.arccos(np.clip(cosines, -1.0, 1.0)).max())
+def bent(subject: Subject, found: Sequence[tuple[Limb, Sequence[RodShape]]]) -> float:
+    """Largest angle by which a tip's axis is turned from the unloaded shape [rad].
+
+    It goes on beyond half a turn, see ``tca_mj.rod.shape.bend``.
+
+    Args:
+        subject: The module.
+        found: Its limbs and their shapes.
+    """
+    angles = []
+    for limb, bodies in found:
+        unloaded = [replace(each, tensions=[slack] * len(each.tensions)) for each in limb.segments]
+        starts = solve_series(unloaded, solver=subject.solver, points=len(bodies[0].arc_length))
+        for tip in limb.tips:
+            way = limb.way(tip)
+            one, other = (np.concatenate([each[i].rotation for i in way])
+                          for each in (starts, bodies))  # fmt: skip
+            angles.append(bend(np.einsum("nji,nj->ni", one, other[:, :, 2])))
+    return max(angles)
 
 
-def _laws(subject: Subject, case: Case) -> list[StrandLaw]:
-    pairs = zip(subject.tcas, case.temperature, strict=True)
-    return [law_at(tca, float(temperature)) for tca, temperature in pairs]
+def _laws(subject: Subject, case: Case) -> list[Law]:
+    """One for each TCA; that of TCAs alike at one temperature is the same."""
+    pairs = list(zip(subject.tcas, case.temperature.tolist(), strict=True))
+    known = {pair: law_at(*pair) for pair in dict.fromkeys(pairs)}
+    return [known[pair] for pair in pairs]

@@ -11,7 +11,18 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from tca_mj.agents.workers import Workers
-from tca_mj.certify.cases import Case, Gap, as_run, at_rest, bent, draw, gap, theory
+from tca_mj.certify.cases import (
+    Case,
+    Gap,
+    as_run,
+    at_rest,
+    bent,
+    draw,
+    gap,
+    shapes,
+    theory,
+    tips_of,
+)
 from tca_mj.certify.rest import Rest
 from tca_mj.certify.subjects import SUBJECTS, Subject
 from tca_mj.model import NotSettledError
@@ -104,8 +115,7 @@ def judge(subject: Subject, case: Case, number: int, effort: Effort) -> Outcome:
     }
     found: dict[str, Any] = {}
     try:
-        exact, found["solver"] = _exact(subject, case)
-        found["bend"] = bent(subject, exact)
+        exact, found["bend"], found["solver"] = _exact(subject, case)
         alone = chain = at_rest(subject, case)
         found["gap"] = gap(subject, chain, exact)
         near = found["solver"] if found["gap"].position > _ELSEWHERE else None
@@ -133,11 +143,17 @@ def judge(subject: Subject, case: Case, number: int, effort: Effort) -> Outcome:
     return Outcome(**asked, **found, seconds=time.process_time() - begin)
 
 
-def _exact(subject: Subject, case: Case) -> tuple[Rest, str]:
+def _exact(subject: Subject, case: Case) -> tuple[Rest, float, str]:
+    """What theory answers, how far the tips are bent, and which solver has found it."""
+    solver = subject.solver
     try:
-        return theory(subject, case), "shooting"
+        found = list(shapes(subject, case, solver=solver))
     except RodSolveError:
-        return theory(subject, case, solver="energy"), "energy"
+        if solver == "energy":
+            raise
+        solver = "energy"
+        found = list(shapes(subject, case, solver=solver))
+    return tips_of(subject, case, found), bent(subject, found), solver
 
 
 def _shear(subject: Subject, case: Case, exact: Rest) -> Gap | None:

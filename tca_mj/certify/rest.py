@@ -8,19 +8,19 @@ user does: a ``Simulation`` is heated from the cold and left alone.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 import mujoco
 import numpy as np
+from numpy.typing import ArrayLike
 
 from tca_mj.checks import Array
 from tca_mj.model.at_rest import NotSettledError
 from tca_mj.model.mujoco_warnings import count_warnings
 from tca_mj.model.part import Part
 from tca_mj.model.smooth import SmoothBody
-from tca_mj.rod.problem import StrandLaw
 from tca_mj.sim import Simulation
 
 _TIMESTEP = 20e-3  # pseudo-time between two looks at the loads [s]
@@ -33,6 +33,19 @@ _PERTURBATION = 1e-6  # of a joint, in the same unit, for the derivative of the 
 
 _HEATING, _LONGEST = 2.0, 20.0  # a run: seconds until all is hot, and until it is given up
 _QUIET = 3e-5  # velocity of the joints at rest [rad/s]
+
+
+Law: TypeAlias = Callable[[ArrayLike], tuple[Array, Array]]
+"""Tension [N] and slope [N/m] over length [m], as ``tca_mj.tca.law_at`` gives it."""
+
+
+class Touching(ValueError):
+    """A part at rest touches something, of which the theory of rods knows nothing."""
+
+    def __init__(self, part: str, one: str, other: str) -> None:
+        super().__init__(
+            f"part must touch nothing at rest, {part!r} has the geom {one} on the geom {other}"
+        )
 
 
 @dataclass(frozen=True, kw_only=True, slots=True, eq=False)
@@ -67,7 +80,7 @@ class Rest(NamedTuple):
 
 
 def rest(
-    part: Part, tips: Sequence[str], laws: Sequence[StrandLaw], load: Load, *,
+    part: Part, tips: Sequence[str], laws: Sequence[Law], load: Load, *,
     start: Mapping[str, float] | None = None,
 ) -> Rest:  # fmt: skip
     """Rest of a part whose TCAs follow laws.
@@ -78,12 +91,13 @@ def rest(
     Args:
         part: The part, all of whose joints belong to cells that TCAs cross; its base is held.
         tips: Names of the t sites that are loaded and looked at.
-        laws: Tension over length of each of its n TCAs.
+        laws: Laws of its n TCAs.
         load: Loads.
         start: Positions of the joints to begin with, by name.
 
     Raises:
         NotSettledError: If no rest is found, or one that is not stable.
+        Touching: If it touches something there.
     """
     body = _Body(part, tips, laws, load)
     if start is not None:
@@ -144,14 +158,17 @@ class _Body:
     """The compiled part under loads."""
 
     def __init__(
-        self, part: Part, tips: Sequence[str], laws: Sequence[StrandLaw], load: Load
+        self, part: Part, tips: Sequence[str], laws: Sequence[Law], load: Load
     ) -> None:
         _hold(part, tips, load)
         part.spec.option.timestep = _TIMESTEP
         count_warnings()
+        self._name = part.spec.modelname
         self.model: mujoco.MjModel = part.spec.compile()
         self.data = mujoco.MjData(self.model)
-        self._laws = laws
+        self._laws: dict[Law, list[int]] = {}  # which TCAs follow each
+        for i, law in enumerate(laws):
+            self._laws.setdefault(law, []).append(i)
         self._hands = [self.model.body(_hand(tip)).id for tip in tips]
         self._actuator = [self.model.actuator(tca.name).id for tca in part.tcas]
         self._tendon = [self.model.tendon(tca.name).id for tca in part.tcas]
@@ -165,13 +182,18 @@ class _Body:
         self._scale = np.where(slide, cell, 1.0)
         self.data.xfrc_applied[self._hands] = np.hstack([load.force, load.moment])
 
-    def left(self, q: Array) -> Array:
-        """What is left of the loads on the joints over their stiffness and scale, shape (nv,)."""
+    def left(self, q: Array, pulled: tuple[Array, Array] | None = None) -> Array:
+        """What is left of the loads on the joints over their stiffness and scale, shape (nv,).
+
+        Args:
+            q: Positions of the joints.
+            pulled: What ``_pull`` gives for them; None to compute it.
+        """
         model, data = self.model, self.data
         data.qpos[:], data.qvel[:] = q, 0.0
         mujoco.mj_fwdPosition(model, data)
         strained = self._body.at(q)
-        tension, slope = self._pull(strained.length + self._more)
+        tension, slope = pulled or self._pull(strained.length + self._more)
         bias = model.actuator_biasprm
         bias[self._actuator, 0] = -tension + slope * data.ten_length[self._tendon]
         bias[self._actuator, 1] = -slope
@@ -181,11 +203,11 @@ class _Body:
 
     def _slope(self, q: Array, left: Array) -> Array:
         """Derivative of what is left by the positions, by differences."""
-        slope = np.empty((len(q), len(q)))
-        for i, scale in enumerate(self._scale):
-            moved = q.copy()
-            moved[i] += _PERTURBATION * scale
-            slope[:, i] = (self.left(moved) - left) / (_PERTURBATION * scale)
+        slope, step = np.empty((len(q), len(q))), _PERTURBATION * self._scale
+        moved = q + np.diag(step)
+        pulled = self._pull(self._body.at(moved).length + self._more)
+        for i, (one, *pull) in enumerate(zip(moved, *pulled, strict=True)):
+            slope[:, i] = (self.left(one, (pull[0], pull[1])) - left) / step[i]
         return slope
 
     def _stable(self, slope: Array) -> bool:
@@ -195,15 +217,28 @@ class _Body:
         return bool(np.linalg.eigvalsh(0.5 * (curving + curving.T)).min() > 0.0)
 
     def _pull(self, length: Array) -> tuple[Array, Array]:
-        now = [law(float(each)) for law, each in zip(self._laws, length, strict=True)]
-        tension, slope = np.array(now, dtype=np.float64).reshape(-1, 2).T
+        """Tensions and their slopes at lengths, shape (..., n) each."""
+        tension, slope = np.empty((2, *length.shape))
+        for law, mine in self._laws.items():
+            tension[..., mine], slope[..., mine] = law(length[..., mine])
         return tension, slope
+
+    def _require_apart(self) -> None:
+        """Raises ``Touching`` where something is touched."""
+        model, data = self.model, self.data
+        for contact in data.contact[: data.ncon]:
+            sides = []
+            for geom in (model.geom(int(number)) for number in contact.geom):
+                body = model.body(int(geom.bodyid[0])).name
+                sides.append(f"{geom.name or geom.id!r} of the body {body!r}")
+            raise Touching(self._name, *sides)
 
     def positions(self, start: Mapping[str, float]) -> Array:
         """The joints' positions from those by name."""
         q = self._start.copy()
-        for name, value in start.items():
-            q[self.model.joint(name).qposadr] = value
+        known = {self.model.joint(i).name for i in range(self.model.njnt)}
+        for name in known.intersection(start):  # without motions that a chain leaves out
+            q[self.model.joint(name).qposadr] = start[name]
         return q
 
     def approach(self, damping: float) -> Array:
@@ -237,5 +272,6 @@ class _Body:
         worst = float(np.abs(left).max())
         if not worst < _TOLERANCE or not self._stable(slope):
             raise NotSettledError(worst)
+        self._require_apart()
         length = self._body.at(q).length + self._more
         return Rest(*_place(self.data, self._hands), length, self._pull(length)[0])

@@ -9,15 +9,16 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from types import MappingProxyType
-from typing import Any, NamedTuple
+from typing import Any
 
+from tca_mj.certify.parts import Limb, Seen
+from tca_mj.model.chain import Member
 from tca_mj.model.part import Part
 from tca_mj.modules.bending import BendingSpec, bending_module
 from tca_mj.modules.finger import FingerPairSpec, finger_pair
 from tca_mj.modules.twisting import TwistingSpec, twisting_module
 from tca_mj.robots.arm import ArmSpec, arm
-from tca_mj.rod import BeamSpec, Segment, StrandLaw
-from tca_mj.routes import Route, parallel
+from tca_mj.rod import Segment, StrandLaw
 from tca_mj.tca import TcaSpec
 
 # Axes of the fingers' bases in the mount, as columns: z to its +x or -x, x to its -z.
@@ -25,20 +26,6 @@ _FINGERS = (
     ((0.0, 0.0, 1.0), (0.0, 1.0, 0.0), (-1.0, 0.0, 0.0)),
     ((0.0, 0.0, -1.0), (0.0, -1.0, 0.0), (-1.0, 0.0, 0.0)),
 )
-_DOWN = ((1.0, 0.0, 0.0), (0.0, -1.0, 0.0), (0.0, 0.0, -1.0))  # axes of the arm's base
-
-class Limb(NamedTuple):
-    """Soft bodies in series from the base to one tip, as theory sees them.
-
-    Attributes:
-        segments: The bodies.
-        tcas: For each of them, which of the part's TCAs its strands are.
-        chains: For each of them, the name of its chain in the part.
-    """
-
-    segments: tuple[Segment, ...]
-    tcas: tuple[tuple[int, ...], ...]
-    chains: tuple[str, ...]
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -59,6 +46,7 @@ class Subject:
             gravity keeps that mirror.
         down: Direction in which the module hangs, shape (3,).
         temperature: Coldest and hottest a TCA becomes [°C].
+        solver: Which solver of the theory is asked first.
     """
 
     what: str
@@ -68,17 +56,21 @@ class Subject:
     limbs: Callable[[Sequence[StrandLaw]], tuple[Limb, ...]]
     tips: tuple[str, ...] = ("tip",)
     postures: tuple[str, ...] = ("hanging", "lying", "standing")
-    force: float
-    moment: float
+    force: float = 0.0
+    moment: float = 0.0
     mirrored: bool = False
     down: tuple[float, float, float] = (0.0, 0.0, 1.0)
     temperature: tuple[float, float] = (25.0, 160.0)
+    solver: str = "shooting"
 
     @property
     def reach(self) -> tuple[float, ...]:
-        """Length of the soft bodies of each limb [m]."""
+        """Length of the soft bodies on the way to each tip [m]."""
         limbs = self.limbs([slack] * len(self.tcas))
-        return tuple(sum(each.beam.length for each in limb.segments) for limb in limbs)
+        return tuple(
+            sum(limb.segments[i].beam.length for i in limb.way(tip))
+            for limb in limbs for tip in limb.tips
+        )  # fmt: skip
 
 
 def slack(length: float) -> tuple[float, float]:
@@ -86,47 +78,70 @@ def slack(length: float) -> tuple[float, float]:
     return 0.0, 0.0
 
 
-def _tcas(build: Callable[[int], Part]) -> tuple[TcaSpec, ...]:
-    return tuple(tca.spec for tca in build(1).tcas)
-
-
-def _loaded(body: BeamSpec, tcas: Sequence[TcaSpec], share: float = 1.0) -> BeamSpec:
-    """A body that carries the mass of its TCAs, or a share of it."""
-    more = sum(tca.mass for tca in tcas) * share / body.length
-    return replace(body, line_density=body.line_density + more)
-
-
 def _finer(spec: Any, times: int) -> Any:
     return replace(spec, nodes=times * spec.nodes)
 
 
+def read(part: Part, *, what: str, build: Callable[[int], Part] | None = None,
+         tips: Mapping[str, str] | None = None, **more: Any) -> Subject:  # fmt: skip
+    """A part as a subject, to theory what the part remembers of itself.
+
+    Args:
+        part: The part; it stays as it is.
+        what: What it is, in a few words.
+        build: The built part with that many times the default nodes; None if that cannot be.
+        tips: Sites at the ends of chains that are looked at, by the chains' names; None for all
+            ends.
+        **more: Other fields of the subject.
+
+    Raises:
+        Outside: If theory does not cover it.
+    """
+    seen = Seen(part)
+
+    def copied(times: int) -> Part:
+        """The part with sites at the ends of its chains."""
+        own = part.copy()
+        for member in seen.chains:
+            body = own.spec.body(member.body(member.nodes))
+            body.add_site(name=_end(member), pos=[0.0, 0.0, member.local(member.nodes)], group=4)
+        return own
+
+    def limbs(laws: Sequence[StrandLaw]) -> tuple[Limb, ...]:
+        return (seen.limb(laws, tips=tips),)
+
+    return Subject(
+        what=what, nodes=tuple(member.nodes for member in seen.chains), build=build or copied,
+        tcas=tuple(tca.spec for tca in part.tcas), limbs=limbs,
+        tips=tuple(tips.values()) if tips else tuple(_end(member) for member in seen.chains),
+        solver="energy" if seen.branches else "shooting", **more,
+    )  # fmt: skip
+
+
+def _end(member: Member) -> str:
+    return f"{member.name}.certified"
+
+
 def _module(
-    module: Callable[[Any], Part], spec: Any, routes: Sequence[Route], what: str, force: float,
-    moment: float,
-) -> Subject:  # fmt: skip
-    """A module of one body, its TCAs on routes through it."""
+    module: Callable[[Any], Part], spec: Any, what: str, force: float, moment: float
+) -> Subject:
+    """A module of one body."""
 
     def build(times: int) -> Part:
         return module(_finer(spec, times))
 
-    def limbs(laws: Sequence[StrandLaw]) -> tuple[Limb, ...]:
-        segment = Segment(_loaded(spec.body, tcas), routes, laws)
-        return (Limb((segment,), (tuple(range(len(routes))),), ("body",)),)
-
-    tcas = _tcas(build)
-    return Subject(what=what, nodes=(spec.nodes,), build=build, tcas=tcas, limbs=limbs,
-                   force=force, moment=moment)  # fmt: skip
+    return read(build(1), what=what, build=build, tips={"body": "tip"}, force=force, moment=moment)
 
 
 def _bending(spec: BendingSpec) -> Subject:
-    what, routes = f"bending module, {spec.count} parallel TCAs", parallel(spec.count, spec.offset)
-    return _module(bending_module, spec, routes, what, force=5e-3, moment=2e-5)
+    what = f"bending module, {spec.count} parallel TCAs"
+    return _module(bending_module, spec, what, force=5e-3, moment=2e-5)
 
 
 def _twisting(spec: TwistingSpec) -> Subject:
     how = "double helix of 2.5 turns" if spec.double else f"helix of {spec.turns:g} turns"
     what = f"twisting module, {how}"
-    return _module(twisting_module, spec, (spec.route,), what, force=2e-2, moment=1e-4)
+    return _module(twisting_module, spec, what, force=2e-2, moment=1e-4)
 
 
 def _finger(spec: FingerPairSpec) -> Subject:
@@ -139,16 +154,18 @@ def _finger(spec: FingerPairSpec) -> Subject:
         return tension, 2.0 * slope
 
     def limbs(laws: Sequence[StrandLaw]) -> tuple[Limb, ...]:
-        body = _loaded(spec.body, tcas, share=0.5)
+        body = replace(
+            spec.body, line_density=spec.body.line_density + 0.5 * tcas[0].mass / spec.body.length
+        )
         place = (0.0, 0.0, spec.thickness / 2.0)
         strands = ((spec.route,), (partial(halved, laws[0]),))
         return tuple(
             Limb((Segment(body, *strands, rotation=frame, offset=place),), ((0,),),
-                 (f"finger{side}",))
+                 (f"finger{side}",), ((0, spec.nodes),), (0,))
             for side, frame in enumerate(_FINGERS)
         )  # fmt: skip
 
-    tcas = _tcas(build)
+    tcas = tuple(tca.spec for tca in build(1).tcas)
     return Subject(
         what="pair of fingers, one U through both", nodes=(spec.nodes,),
         build=build, tcas=tcas, limbs=limbs,
@@ -180,27 +197,10 @@ def _arm(spec: ArmSpec) -> Subject:
         body.explicitinertial = 1
         return Part(mjspec, part.tcas[:-1])
 
-    def limbs(laws: Sequence[StrandLaw]) -> tuple[Limb, ...]:
-        bending, twisting = spec.bending, spec.twisting
-        count = bending.count
-        end = spec.connector_mass + mass
-        first = Segment(
-            _loaded(bending.body, tcas[:count]), parallel(count, bending.offset), laws[:count],
-            rotation=_DOWN, mass=spec.connector_mass, centre=(0.0, 0.0, spec.connector / 2.0),
-        )  # fmt: skip
-        second = Segment(
-            _loaded(twisting.body, tcas[count:]), (twisting.route,), laws[count:],
-            offset=(0.0, 0.0, spec.connector), mass=end,
-            centre=(0.0, 0.0, (spec.connector_mass * spec.connector / 2.0 + mass * centre) / end),
-        )  # fmt: skip
-        chains = ("bending.body", "wrist.body")
-        return (Limb((first, second), (tuple(range(count)), (count,)), chains),)
-
-    tcas = _tcas(build)
-    return Subject(
-        what="arm: bending module and wrist, the hand a mass",
-        nodes=(spec.bending.nodes, spec.twisting.nodes), build=build, tcas=tcas, limbs=limbs,
-        tips=("wrist.tip",), postures=("hanging",), force=5e-3, moment=2e-5, down=(0.0, 0.0, -1.0),
+    return read(
+        build(1), what="arm: bending module and wrist, the hand a mass", build=build,
+        tips={"wrist.body": "wrist.tip"}, postures=("hanging",), force=5e-3, moment=2e-5,
+        down=(0.0, 0.0, -1.0),
     )  # fmt: skip
 
 

@@ -28,6 +28,7 @@ examples:
   tca-mj bench --out runs/bench                 how fast it is on this machine
   tca-mj validate tca --out runs/validation     the models against what is published
   tca-mj certify --out runs/certificate         the chains against the theory of rods
+  tca-mj certify my_robots:two_modules          a robot of one's own, the same way
 """
 
 
@@ -44,6 +45,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     Raises:
         SystemExit: With code 2 if the arguments are wrong, 0 after ``--help`` or ``--version``.
     """
+    if os.getcwd() not in sys.path:  # where one's own robots and tasks are: module:name
+        sys.path.append(os.getcwd())
     arguments = argparse.Namespace(command="", kept=[], needs=lambda: "")
     with Signals() as signals:
         try:
