@@ -1,10 +1,11 @@
 from tca_mj.actuation import Group, MixedBank, MixedState, Muscle, MuscleBank
 from tca_mj.batch import SimulationBatch
+from tca_mj.envs.vector import register_task
 from tca_mj.exported import export, frozen
 from tca_mj.model.build import add_tca, stage
 from tca_mj.model.chain import Chain, add_chain
 from tca_mj.model.part import Part, new_spec
-from tca_mj.model.scene import scene
+from tca_mj.model.scene import in_arena, scene
 from tca_mj.model.tendon import RoutedTca
 from tca_mj.modules.bending import BendingSpec, bending_module
 from tca_mj.modules.continuum_leg import LegSpec, continuum_leg
@@ -35,7 +36,7 @@ __all__ = [
     "SimulationState", "Supply", "TASKS", "Task", "TcaBank", "TcaSpec", "TetrapodSpec",
     "Thermostat", "TwistingSpec", "UTurn", "Variation", "add_chain", "add_tca", "arm",
     "bending_module", "continuum_leg", "episode_steps", "export", "find_task", "finger_pair",
-    "frozen", "get_state", "leg_length", "make", "morphing_module", "new_spec", "parallel",
-    "register", "rigid_tetrapod", "scene", "set_state", "stage", "task_class", "tetrapod",
-    "twisting_module",
+    "frozen", "get_state", "in_arena", "leg_length", "make", "morphing_module", "new_spec",
+    "parallel", "register", "register_task", "rigid_tetrapod", "scene", "set_state", "stage",
+    "task_class", "tetrapod", "twisting_module",
 ]  # fmt: skip

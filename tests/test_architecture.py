@@ -67,6 +67,14 @@ ONLY_IN = {"matplotlib": {"record", "validation"}}
 # What a file may import although its layer may not.
 BESIDES = {"registry": {"gymnasium"}, "checks": {"numpy"}, "quadrature": {"numpy"}}
 
+# Where the names that the door offers come from.
+HOMES = {
+    alias.name: str(node.module)
+    for node in ast.parse((ROOT / "tca_mj" / "__init__.pyi").read_text(encoding="utf-8")).body
+    if isinstance(node, ast.ImportFrom)
+    for alias in node.names
+}
+
 
 def source_files() -> dict[str, Path]:
     """The files of the package by module name; ``tca_mj.rod.__init__`` keeps its last part."""
@@ -116,7 +124,22 @@ def imports(tree: ast.AST, modules: Collection[str]) -> Iterator[tuple[ast.stmt,
             source = "." * node.level + (node.module or "")
             for alias in node.names:
                 ours = source.split(".")[0] == "tca_mj"
-                yield node, resolve(f"{source}.{alias.name}", modules) if ours else source
+                name = alias.name
+                # What the door fetches from somewhere stands there.
+                home = HOMES.get(name, source) if source == "tca_mj" else source
+                yield node, resolve(f"{home}.{name}", modules) if ours else source
+
+
+def fetched(tree: ast.AST) -> set[str]:
+    """What of other files a file takes through the package's door, as ``tca_mj.<name>``."""
+    return {
+        node.attr
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Attribute)
+        and isinstance(node.value, ast.Name)
+        and node.value.id == "tca_mj"
+        and (node.attr in HOMES or node.attr in STACK)
+    }
 
 
 def breaches(module: str, source: str, modules: Collection[str]) -> list[str]:
@@ -202,6 +225,16 @@ def test_imports_stay_within_the_layers(module):
     assert breaches(module, FILES[module].read_text(encoding="utf-8"), FILES) == []
 
 
+def test_one_file_takes_something_from_above_through_the_door():
+    """A part is led to rest by a simulation to be exported: ``Part.export``."""
+    found = {
+        (module, name)
+        for module, path in FILES.items()
+        for name in fetched(ast.parse(path.read_text(encoding="utf-8")))
+    }
+    assert found == {("tca_mj.model.part", "export")}
+
+
 def test_no_circle_of_imports():
     assert cycle({module: path.read_text(encoding="utf-8") for module, path in FILES.items()}) == []
 
@@ -236,6 +269,7 @@ PLANTED = [
         ("tca_mj.tca.bank", "from tca_mj.sim import Simulation", "stands above it"),
         ("tca_mj.tca.bank", "from tca_mj import sim", "stands above it"),
         ("tca_mj.tca.bank", "def f():\n    import tca_mj.sim", "stands above it"),
+        ("tca_mj.tca.bank", "from tca_mj import Simulation", "stands above it"),
         ("tca_mj.tca.bank", "from tca_mj.nowhere import x", "does not exist"),
         ("tca_mj.tca.bank", "from . import spec", "relatively"),
         ("tca_mj.tca.bank", "import pandas", "has no lowest layer"),

@@ -65,6 +65,16 @@ def test_the_keyframe_is_the_rest(tmp_path):
     assert np.abs(data.xpos - before).max() < 1e-6
 
 
+def test_a_part_exports_itself(tmp_path):
+    """The method is the function, and takes what it takes."""
+    part = bending_module()
+    text = part.export(tmp_path / "robot.xml", temperatures=[100.0, 25.0, 25.0])
+    assert text == export(part, temperatures=[100.0, 25.0, 25.0])
+    assert (tmp_path / "robot.xml").read_text(encoding="utf-8") == text
+    with pytest.raises(ValueError, match="temperatures must be a real number"):
+        part.export(temperatures="hot")
+
+
 def test_what_is_exported_stays_as_it_was():
     part = bending_module()
     before = part.spec.to_xml()

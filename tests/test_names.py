@@ -40,8 +40,7 @@ INTERNAL = {
     "tca_mj.model": {"curves": "*", "smooth": "*", "spines": "*", "surface": "*"},
     "tca_mj.robots": {"tetrapod": "add_rail attach_legs dress route_spine_tca trunk"},
     "tca_mj.record": {
-        "layout": "*", "plots": "event_rows save_figure", "reader": "*", "render": "Closing",
-        "shapes": "*",
+        "layout": "*", "plots": "event_rows save_figure", "render": "Closing", "shapes": "*",
     },
     "tca_mj.certify": {"": "*"},
     "tca_mj.validation": {"": "*"},

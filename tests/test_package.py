@@ -76,6 +76,22 @@ def test_importing_the_package_loads_nothing_heavy(tmp_path):
     assert loaded == "[]"
 
 
+def test_recordings_are_read_under_the_name_of_their_folder(tmp_path):
+    """Without an import of it, and without Rerun until then."""
+    code = """
+import sys, tca_mj
+folder = tca_mj.record
+print("rerun" in sys.modules)
+try:
+    folder.read("nothing.rrd")
+except FileNotFoundError as error:
+    print(error, "rerun" in sys.modules)
+"""
+    assert run_python(code, tmp_path).splitlines() == [
+        "False", "there is no recording nothing.rrd True"
+    ]  # fmt: skip
+
+
 @pytest.mark.parametrize("module", ["tca_mj.tca", "tca_mj.rod", "tca_mj.smp", "tca_mj.control"])
 def test_the_physics_needs_numpy_and_scipy_alone(tmp_path, module):
     """Whatever else is hidden, everything that it offers is there, and a TCA pulls."""

@@ -1,6 +1,7 @@
 from tca_mj.record.film import Film
 from tca_mj.record.layout import QUANTITIES
 from tca_mj.record.plots import rollout_plot, series_colours, temperature_colour
+from tca_mj.record.reader import Curve, Recording, read, write_csv
 from tca_mj.record.recorder import Recorded, Recorder
 from tca_mj.record.render import (
     Offscreen,
@@ -11,6 +12,7 @@ from tca_mj.record.render import (
 )
 
 __all__ = [
-    "Film", "Offscreen", "QUANTITIES", "Recorded", "Recorder", "RenderingUnavailable", "Watched",
-    "colour_tendons", "gl_backend", "rollout_plot", "series_colours", "temperature_colour",
+    "Curve", "Film", "Offscreen", "QUANTITIES", "Recorded", "Recorder", "Recording",
+    "RenderingUnavailable", "Watched", "colour_tendons", "gl_backend", "read", "rollout_plot",
+    "series_colours", "temperature_colour", "write_csv",
 ]  # fmt: skip

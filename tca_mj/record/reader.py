@@ -1,5 +1,7 @@
 """Recordings read back: curves as arrays with their times and units, and as a table."""
 
+from __future__ import annotations
+
 import csv
 import io
 from collections import defaultdict
@@ -26,7 +28,7 @@ class Curve:
 
     Attributes:
         time: Recorded times, rising, shape (k,) [s].
-        values: Values at these times, shape (k,).
+        values: Values at these times, in the unit ``unit``, shape (k,).
         unit: Their unit; ``-`` where the recording says none.
     """
 
@@ -51,6 +53,9 @@ class Recording:
 
 def read(path: str | Path) -> Recording:
     """Reads a recording that ``Recorder`` has written.
+
+    Args:
+        path: The file.
 
     Raises:
         FileNotFoundError: If there is no such file.
@@ -96,6 +101,10 @@ def write_csv(recording: Recording, path: str | Path) -> None:
     """Writes the curves as one table: a row for every time, a column with its unit for each curve.
 
     Where a curve has no value at a time its field is empty.
+
+    Args:
+        recording: What ``read`` gave.
+        path: The file to write.
     """
     times = np.unique(np.concatenate([c.time for c in recording.curves.values()] or [np.zeros(0)]))
     heads = [f"{name} [{curve.unit}]" for name, curve in recording.curves.items()]
