@@ -7,7 +7,7 @@ from tca_mj.envs.reach import BendReach, BendReachVector
 from tca_mj.envs.table import Entry, Table
 from tca_mj.envs.task import HEATINGS, Headway, SimulatedTask, TaskArguments, TaskState, Verdict
 from tca_mj.envs.tetrapod import GaitTask, TetrapodGait, TetrapodGaitVector
-from tca_mj.envs.vector import TaskVector
+from tca_mj.envs.vector import TaskVector, register_task
 from tca_mj.envs.viewer import NoDisplay, ViewerEnvironment, ViewerPolicy, launch, need_display
 from tca_mj.envs.wrappers import RecordRerun, ScaledObservation, VectorScaledObservation
 
@@ -18,5 +18,5 @@ __all__ = [
     "Table", "TaskArguments", "TaskState", "TaskVector", "TetrapodCourse", "TetrapodCourseVector",
     "TetrapodGait", "TetrapodGaitVector", "Uniform", "VectorScaledObservation", "Verdict",
     "ViewerEnvironment", "ViewerPolicy", "hang", "hanging_module", "launch", "need_display",
-    "variation_options",
+    "register_task", "variation_options",
 ]  # fmt: skip

@@ -301,8 +301,7 @@ class ArmPickPlace(SimulatedTask):
 
     def bent(self) -> float:
         """Angle of the bending module's tip from straight down [rad]."""
-        down = -float(self.data.site("arm.bending.tip").xmat[8])
-        return float(np.arccos(np.clip(down, -1.0, 1.0)))
+        return self.sim.bend("arm.bending.body")
 
     def outcome(self) -> dict[str, Any]:
         """Where object and cup are [m]."""

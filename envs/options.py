@@ -29,21 +29,28 @@ class Option:
         high: Upper bound [``unit``].
         choices: What can be chosen, if it is no number.
         draw: Its value if none is given, from the episode's generator and the rows above; it is
-            called in any case, so that a value that is given shifts no other draw.
+            called in any case, so that a value that is given shifts no other draw. None for evenly
+            between the bounds.
         drawn: How that is done, in a few words.
         check: Raises a ``ValueError`` for a value that bounds do not exclude.
     """
 
     name: str
     about: str
-    draw: Callable[[np.random.Generator, Setup], Any]
-    drawn: str
+    draw: Callable[[np.random.Generator, Setup], Any] | None = None
+    drawn: str = "drawn"
     unit: str = "-"
     shape: tuple[int, ...] = ()
     low: float = -np.inf
     high: float = np.inf
     choices: tuple[str, ...] = ()
     check: Callable[[Any], None] | None = None
+
+    def value(self, random: np.random.Generator, setup: Setup) -> Any:
+        """Its value if none is given, drawn after those in ``setup``."""
+        if self.draw is not None:
+            return self.draw(random, setup)
+        return random.uniform(self.low, self.high, self.shape or None)
 
     def checked(self, value: Any) -> Any:
         """A value that was given: a string, a float or an array.
@@ -97,7 +104,7 @@ class Options:
             )
         found: Setup = {}
         for row in self.rows:
-            drawn = row.draw(random, found)
+            drawn = row.value(random, found)
             found[row.name] = row.checked(given[row.name]) if row.name in given else drawn
         return found
 

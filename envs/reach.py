@@ -238,8 +238,7 @@ class BendReach(SimulatedTask):
 
     def bent(self) -> float:
         """Angle of the tip from straight down [rad]."""
-        down = -float(self.data.site("bench.module.tip").xmat[8])
-        return float(np.arccos(np.clip(down, -1.0, 1.0)))
+        return self.sim.bend("bench.module.body")
 
 
 BendReachVector = partial(TaskVector, BendReach)  # several, stepped together

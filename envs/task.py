@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from copy import deepcopy
 from dataclasses import asdict, dataclass, field
-from typing import Any, ClassVar, TypedDict
+from typing import Any, ClassVar, TypedDict, Unpack
 
 import gymnasium as gym
 import mujoco
@@ -14,8 +14,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tca_mj.checks import number
-from tca_mj.envs.options import Options, Setup, variation_of
-from tca_mj.envs.table import Table, numbers
+from tca_mj.envs.options import Option, Options, Setup, variation_of, variation_options
+from tca_mj.envs.table import Entry, Table, numbers
+from tca_mj.model.part import Part
 from tca_mj.record.render import Offscreen, colour_tendons
 from tca_mj.sim import Drive, Simulation, SimulationDiverged, SimulationOverheated
 from tca_mj.state import SimulationState, get_state, set_state
@@ -115,6 +116,9 @@ class SimulatedTask(gym.Env[Observation, Action], ABC):
     is the episode over (``judge``). A vector environment calls begin and finish for each of its
     tasks and lets all simulations run between them.
 
+    A task has an ``__init__`` of its own, or says in its class what it is made of: ``scene``,
+    ``rows`` and ``option_rows``; then its action heats all TCAs.
+
     The row "TCA heating" of an action says, from -1 to 1, with ``action="temperature"`` which
     temperature a thermostat holds each TCA at until the next action, from that of the surroundings
     (25 °C; off) to ``safe_temperature``; with ``action="power"`` its power, from 0 to
@@ -154,7 +158,8 @@ class SimulatedTask(gym.Env[Observation, Action], ABC):
         hot_temperature: Temperature from which on heat is charged [°C].
         terms: Names of the terms of the reward.
         scripted: ``module:callable`` that makes its scripted policy from the task, or such a
-            callable.
+            callable. A task that needs no memory for it may have a method ``script`` instead, from
+            an observation to an action.
         scripted_arguments: Arguments of ``__init__`` that its scripted policy needs.
         robot_argument: Argument of ``__init__`` that is the robot's specification, and what makes
             the default one; None if it has none.
@@ -166,6 +171,9 @@ class SimulatedTask(gym.Env[Observation, Action], ABC):
         learning_arguments: Arguments of ``__init__`` in training.
         finer: Finer models of the robot by name: each turns the specification into arguments of
             ``__init__``, the finer specification among them.
+        scene: What builds the robot in its scene from its specification.
+        rows: Rows of ``observation``.
+        option_rows: Rows of ``options``, before those that all tasks have.
     """
 
     metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 10}
@@ -186,6 +194,10 @@ class SimulatedTask(gym.Env[Observation, Action], ABC):
     robot_argument: ClassVar[tuple[str, Callable[[], Any]] | None] = None
     finer: ClassVar[Mapping[str, Callable[[Any], dict[str, Any]]]] = {}
 
+    scene: ClassVar[Callable[[Any], Part] | None] = None
+    rows: ClassVar[Sequence[Entry]] = ()
+    option_rows: ClassVar[Sequence[Option]] = ()
+
     legs: ClassVar[int] = 0
     film_speed: ClassVar[float] = 8.0
     published_speed: ClassVar[Mapping[str, float]] = {}
@@ -203,6 +215,32 @@ class SimulatedTask(gym.Env[Observation, Action], ABC):
     _camera: str
     _size: tuple[int, int]
     _screen: Offscreen | None = None
+
+    def __init__(
+        self, *, spec: Any = None, timestep: float = 5e-3, **common: Unpack[TaskArguments]
+    ) -> None:
+        """Builds what the class says.
+
+        Args:
+            spec: The robot's specification; None for what ``robot_argument`` makes, ``spec`` being
+                its name there, or for none.
+            timestep: Physics time step, of which ``control_period`` is a multiple [s].
+            **common: See ``TaskArguments``.
+
+        Raises:
+            ValueError: If the class has no scene, an argument is unknown or out of range, or the
+                robot cannot be built.
+        """
+        kind = type(self)
+        if kind.scene is None:
+            raise ValueError(f"scene must be what builds the robot of {kind.__name__}, got None")
+        if spec is None and kind.robot_argument is not None:
+            spec = kind.robot_argument[1]()
+        part = kind.scene(spec)
+        sim = Simulation(part, timestep=timestep, tca_period=kind.control_period)
+        heating = Entry("TCA heating", sim.n, -1.0, 1.0, "-", off=-1.0)
+        options = Options([*kind.option_rows, *variation_options()])
+        self._open(sim, Table(kind.rows), Table([heating]), options, **common)
 
     def _open(
         self,
@@ -273,17 +311,17 @@ class SimulatedTask(gym.Env[Observation, Action], ABC):
         told[: command.size] += (high - low) * ((command + 1.0) / 2.0)
         return told
 
-    @abstractmethod
     def prepare(self, setup: Setup) -> None:
         """Begins an episode: resets the simulation and puts everything where it starts.
 
         Args:
             setup: A value for every option.
         """
+        self.sim.reset()
 
-    @abstractmethod
     def drive(self, command: NDArray[np.float64]) -> Drive:
         """Translates a command, the action within its bounds, to what drives the simulation."""
+        return Drive(command=self.heated(command))
 
     @abstractmethod
     def observe(self) -> dict[str, ArrayLike]:

@@ -11,8 +11,10 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Mapping, Sequence
 from copy import deepcopy
+from functools import partial
 from typing import Any
 
+import gymnasium as gym
 import numpy as np
 from gymnasium.error import ClosedEnvironmentError, ResetNeeded
 from gymnasium.vector import AutoresetMode, VectorEnv
@@ -328,3 +330,21 @@ def _mask(mask: Any, size: int) -> Flags:
     if mask.shape != (size,) or not mask.any():
         raise ValueError(f"reset_mask must have shape ({size},) and name a task, got {mask}")
     return mask
+
+
+def register_task(
+    id: str, task: type[SimulatedTask], *, max_episode_steps: int | None = None, **arguments: Any
+) -> None:
+    """Makes a task known to Gymnasium, alone and as several in one vector environment.
+
+    Args:
+        id: Its Gymnasium id, ``Place/Name-v0``.
+        task: Its class.
+        max_episode_steps: Number of control steps after which an episode is truncated.
+        **arguments: Arguments of the class that make it this task; a caller's own come on top.
+    """
+    entry: Callable[..., Any] = task
+    gym.register(
+        id, entry_point=entry, vector_entry_point=partial(TaskVector, task),
+        max_episode_steps=max_episode_steps, kwargs=arguments,
+    )  # fmt: skip

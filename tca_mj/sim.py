@@ -27,6 +27,7 @@ from tca_mj.model.mujoco_warnings import count_warnings
 from tca_mj.model.part import Part
 from tca_mj.model.smooth import SmoothBody
 from tca_mj.model.spines import Spines
+from tca_mj.rod.shape import bend
 from tca_mj.tca import (
     CalibrationError,
     CoilSolveError,
@@ -104,6 +105,7 @@ class Simulation:
         steadiness: Time over which the damping of taut tendons is made, see ``body`` [s].
         length_offset: Lengths of the TCAs over those of their curves in ``body``, shape (n,) [m].
         spines: The shape-memory spines, if there are any.
+        chains: Its chains by name.
         gain: Factor of every tension over the TCAs' law, see ``tca_mj.variation``.
 
     Example:
@@ -156,6 +158,7 @@ class Simulation:
         self.model: mujoco.MjModel = part.spec.compile()
         self.data = mujoco.MjData(self.model)
         self.tca_period = tca_period
+        self.chains = part.members
         self.tca_names = tuple(tca.name for tca in part.tcas)
         self.bank = _bank([tca.spec for tca in part.tcas], law, ambient)
         self.bank.supply = supply or Supply()
@@ -326,6 +329,26 @@ class Simulation:
     def energy(self) -> NDArray[np.float64]:
         """Electrical energy put into each TCA so far, shape (n,) [J]."""
         return self.tca.energy_in
+
+    def bend(self, *chains: str) -> float:
+        """Angle by which the end of a chain is turned from its base, beyond half a turn too [rad].
+
+        Args:
+            *chains: Its name; of several, each standing on the one before, the end of the last is
+                meant, and the base of the first.
+
+        Raises:
+            ValueError: If there is no such chain.
+        """
+        unknown = [name for name in chains if name not in self.chains]
+        if unknown or not chains:
+            raise ValueError(f"chains must be some of {list(self.chains)}, got {unknown or chains}")
+        bodies = [
+            self.model.body(member.body(piece)).id
+            for member in (self.chains[name] for name in chains)
+            for piece in range(member.nodes + 1)
+        ]
+        return bend(self.data.xmat[bodies].reshape(-1, 3, 3)[:, :, 2])
 
     @property
     def motors(self) -> tuple[str, ...]:

@@ -169,22 +169,23 @@ def test_a_task_with_another_kind_is_vectorised(own, monkeypatch):
     """A task of the kind, alone and two together: the same bits, and the energy of both."""
     import own_task
 
-    from tca_mj.envs.vector import TaskVector
+    from tca_mj import in_arena
+    from tca_mj.envs import Entry, TaskVector
 
-    class Mixed(own_task.Nod):
-        def drive(self, command):
-            return Drive(command=np.repeat(self.max_power * (command + 1.0) / 2.0, 3))
+    class Mixed(own_task.Turn):
+        robot_argument = None
+        rows = (Entry("TCA temperature", 3, -50.0, 300.0, "°C"), *own_task.Turn.rows[1:])
+        scene = staticmethod(lambda spec: in_arena(own.sma_module()))
 
-        def observe(self):
-            return super().observe() | {"TCA temperature": self.sim.temperature[:1]}
+        def bent(self):
+            return self.sim.bend("robot.body")
 
-    monkeypatch.setattr(own_task, "bending_module", lambda spec: own.sma_module())
     together, alone = TaskVector(Mixed, num_envs=2, action="power"), Mixed(action="power")
     together.reset(seed=[3, 4])
     alone.reset(seed=4)
     for command in (0.2, -0.5):
-        outcomes = together.advance(np.full((2, 1), command, np.float32))
-        observation, reward, *_, info = alone.step(np.full(1, command, np.float32))
+        outcomes = together.advance(np.full((2, 3), command, np.float32))
+        observation, reward, *_, info = alone.step(np.full(3, command, np.float32))
         assert np.array_equal(outcomes[1][0], observation) and outcomes[1][1] == reward
         assert np.array_equal(outcomes[1][4]["energy"], info["energy"])
     assert (info["energy"] > 0.0).all()

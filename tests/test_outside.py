@@ -16,7 +16,7 @@ from tca_mj.bench import vector
 from tca_mj.envs.wrappers import RecordRerun
 
 ROOT = Path(__file__).parent.parent
-NOD = "own_task:Example/Nod-v0"
+TURN = "own_task:Example/Turn-v0"
 
 
 @pytest.fixture(autouse=True)
@@ -25,31 +25,31 @@ def examples(monkeypatch):
 
 
 def test_it_is_listed_and_its_options_with_it(capsys):
-    assert cli.main(["list", NOD]) == 0
+    assert cli.main(["list", TURN]) == 0
     said = capsys.readouterr().out
-    assert "Nod to an angle" in said and "options angle, randomise" in said
+    assert "Turn the tip to an angle" in said and "options angle, randomise" in said
 
 
 def test_it_is_evaluated_also_off_and_by_design(tmp_path, capsys):
-    command = ["eval", "scripted", "--task", NOD, "--episodes", "2", "--out", str(tmp_path)]
+    command = ["eval", "scripted", "--task", TURN, "--episodes", "2", "--out", str(tmp_path)]
     assert cli.main([*command, "--randomise", "0.1"]) == 0
     assert "success" in capsys.readouterr().out
-    off = evaluate(Evaluation(task=NOD, policy="off", steps=5, episodes=1))
+    off = evaluate(Evaluation(task=TURN, policy="off", steps=5, episodes=1))
     assert off["episodes"][0]["energy"] == 0.0
-    longer = Evaluation(task=NOD, design={"length": 0.06}).make()
-    assert longer.unwrapped.data.site("robot.stick.tip").xpos[2] == pytest.approx(0.04, abs=2e-3)
+    longer = Evaluation(task=TURN, design={"length": 0.06}).make()
+    assert longer.unwrapped.data.site("robot.tip").xpos[2] == pytest.approx(0.01, abs=2e-3)
 
 
 def test_it_is_demonstrated_and_recorded(tmp_path, capsys):
-    command = ["demo", "--policy", "scripted", "--task", NOD, "--no-video"]
-    options = ["--option", "angle=0.2", "--out", str(tmp_path)]
+    command = ["demo", "--policy", "scripted", "--task", TURN, "--no-video"]
+    options = ["--option", "angle=0.5", "--out", str(tmp_path)]
     assert cli.main([*command, *options]) == 0
-    assert f"scripted in {NOD}: success" in capsys.readouterr().out
+    assert f"scripted in {TURN}: success" in capsys.readouterr().out
     summary = json.loads((tmp_path / "summary.json").read_text())
-    assert summary["phases"][0]["name"] == "nod" and "rollout.rrd" in summary["files"]
-    with RecordRerun(gym.make(NOD), tmp_path / "own.rrd") as env:
+    assert summary["phases"][0]["name"] == "script" and "rollout.rrd" in summary["files"]
+    with RecordRerun(gym.make(TURN), tmp_path / "own.rrd") as env:
         env.reset(seed=0)
-        env.step(np.zeros(1, dtype=np.float32))
+        env.step(np.zeros(9, dtype=np.float32))
     assert (tmp_path / "own.rrd").stat().st_size > 1000
 
 
@@ -58,11 +58,11 @@ def test_it_is_learned_and_what_was_learned_acts(tmp_path, capsys):
     from tca_mj.agents.train.deep import train
 
     config = TrainConfig(
-        task=NOD, algorithm="sac", learner=OffPolicy(learning_starts=20, hidden=(8,)), steps=60,
+        task=TURN, algorithm="sac", learner=OffPolicy(learning_starts=20, hidden=(8,)), steps=60,
         envs=2, interval=40, evaluation_episodes=1,
     )  # fmt: skip
     train(config, tmp_path / "run", video=False, progress=False)
-    command = ["eval", str(tmp_path / "run"), "--task", NOD, "--episodes", "1"]
+    command = ["eval", str(tmp_path / "run"), "--task", TURN, "--episodes", "1"]
     assert cli.main([*command, "--steps", "5", "--out", str(tmp_path / "eval")]) == 0
     assert "return" in capsys.readouterr().out
 
@@ -70,15 +70,15 @@ def test_it_is_learned_and_what_was_learned_acts(tmp_path, capsys):
 def test_it_can_be_viewed_where_there_is_a_screen(monkeypatch, capsys):
     for name in ("DISPLAY", "WAYLAND_DISPLAY"):
         monkeypatch.delenv(name, raising=False)
-    assert cli.main(["view", NOD]) == 2
+    assert cli.main(["view", TURN]) == 2
     assert "no screen" in capsys.readouterr().err
 
 
 def test_it_is_swept_and_timed():
-    sweep = Sweep(evaluation=Evaluation(task=NOD), axes={"design.length": (0.05, 0.06)})
+    sweep = Sweep(evaluation=Evaluation(task=TURN), axes={"design.length": (0.05, 0.06)})
     lengths = [trial.evaluation(Path()).make().unwrapped.sim.model for trial in sweep.trials()]
     assert lengths[0].body_mass.sum() < lengths[1].body_mass.sum()
-    assert NOD in vector.benchmark(ids=[NOD], num_envs=2, scale=0.1)["tasks"]
+    assert TURN in vector.benchmark(ids=[TURN], num_envs=2, scale=0.1)["tasks"]
 
 
 def test_the_machinery_names_no_task_and_no_robot():

@@ -11,7 +11,7 @@ from tca_mj.envs.task import Verdict
 from tca_mj.registry import TASKS
 from tca_mj.testing import CHECKS, check_task
 
-OUTSIDE = "own_task:Example/Nod-v0"
+OUTSIDE = "own_task:Example/Turn-v0"
 IDS = [*(task.id for task in TASKS), OUTSIDE]
 
 

@@ -1,4 +1,4 @@
-from tca_mj.agents.policies.actors import Blind, actor, arguments_of, first_gait, scripted
+from tca_mj.agents.policies.actors import Blind, Script, actor, arguments_of, first_gait, scripted
 from tca_mj.agents.policies.files import (
     NetworkPolicy,
     Origin,
@@ -22,7 +22,7 @@ from tca_mj.agents.policies.sb3_zip import Model
 
 __all__ = [
     "Blind", "GaitPolicy", "Model", "Network", "NetworkPolicy", "Origin", "Policy", "Preprocessing",
-    "ResidualPolicy", "SavedPolicy", "Statistics", "actor", "arguments_of", "find", "first_gait",
-    "load_policy", "read_zip", "require_arguments", "saved_policy", "scripted", "shipped",
-    "with_clock",
+    "ResidualPolicy", "SavedPolicy", "Script", "Statistics", "actor", "arguments_of", "find",
+    "first_gait", "load_policy", "read_zip", "require_arguments", "saved_policy", "scripted",
+    "shipped", "with_clock",
 ]  # fmt: skip

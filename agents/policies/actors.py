@@ -41,6 +41,22 @@ class Blind:
         return self.draw()
 
 
+@dataclass(slots=True)
+class Script:
+    """Acts by a method of the task.
+
+    Attributes:
+        act: The method, from an observation to the action for the next control period.
+        phase: What it is called.
+    """
+
+    act: Callable[[NDArray[np.float32]], NDArray[np.float32]]
+    phase: str = "script"
+
+    def reset(self) -> None:
+        """Nothing is remembered."""
+
+
 def actor(
     name: str | Path, env: Any, *, seed: int = 0, preprocessing: Preprocessing | None = None
 ) -> Policy:
@@ -94,6 +110,8 @@ def scripted(env: Any) -> Policy:
     """
     task = env.unwrapped
     maker = task.scripted
+    if maker is None and hasattr(task, "script"):
+        return Script(task.script)
     if maker is None:
         raise ValueError(f"policy 'scripted': {type(task).__name__} has none")
     require_arguments(task.scripted_arguments, env)
