@@ -13,6 +13,8 @@ from typing import Annotated, Any
 
 from tca_mj.checks import quantity, shown
 
+_SOFTEST = 100.0  # of gels that still have a shape [Pa]
+
 
 def size(
     name: str, value: Any, *, kind: str, at_most: float, at_least: float | None = None,
@@ -42,13 +44,19 @@ def size(
     return found
 
 
-def modulus(name: str, value: Any, *, kind: str = "gels", least: float = 1e3) -> float:
-    """One modulus of elasticity, at least what the softest of a kind have [Pa]; as ``size``."""
+def modulus(name: str, value: Any, *, typed: float = 1e6) -> float:
+    """One modulus of elasticity [Pa], not softer than any gel; errors as ``size``.
+
+    Args:
+        name: What it is, for the message.
+        value: The number.
+        typed: The unit that is probably meant where it is softer: megapascal, or 1e9 [Pa].
+    """
     found = quantity(name, value, above=0.0)
-    if found < least:
-        meant = _meant([found * 1e6, found * 1e9], least, math.inf, "Pa")
+    if found < _SOFTEST:
+        meant = _meant([found * typed], _SOFTEST, math.inf, "Pa")
         raise ValueError(
-            f"{name} must be at least {least:g} Pa ({kind} are above), got {shown(value)}{meant}"
+            f"{name} must be at least {_SOFTEST:g} Pa (gels are above), got {shown(value)}{meant}"
         )
     return found
 

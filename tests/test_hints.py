@@ -172,4 +172,4 @@ def test_the_hints_themselves():
     assert hints.nearest("zzz", ["walk"]) == hints.nearest(3, ["walk"]) == ""
     assert hints.size("x", 0.5, kind="boxes", at_most=0.5) == 0.5
     assert hints.angle("x", 1.5, below=math.pi / 2) == 1.5
-    assert hints.modulus("x", 1e3) == 1e3
+    assert hints.modulus("x", 100.0) == 100.0

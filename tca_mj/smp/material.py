@@ -42,7 +42,7 @@ class SmpSpec(Checked):
         ValueError: If a number is out of range.
     """
 
-    glassy: Annotated[float, partial(modulus, kind="glasses", least=1e7)] = 2.5e9
+    glassy: Annotated[float, partial(modulus, typed=1e9)] = 2.5e9
     rubbery: Modulus = 6e6
     rigid_below: float = 80.0
     soft_above: Finite = 110.0

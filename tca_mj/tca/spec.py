@@ -23,7 +23,7 @@ from tca_mj.tca.thermal import BodyHeat, HeatSpec
 _ABSOLUTE_ZERO = -273.15  # [°C]
 _UPRIGHT = math.pi / 2.0  # pitch of a straight fibre [rad]
 
-_Modulus = Annotated[float, partial(modulus, kind="fibres", least=1e7)]
+_Modulus = Annotated[float, partial(modulus, typed=1e9)]
 _LineDensity = Annotated[float, partial(size, kind="fibres", at_most=0.1, unit="kg/m")]
 _length = partial(size, kind="threads", at_most=10.0)
 _coil = partial(size, kind="coils", at_most=0.05)
