@@ -1,5 +1,6 @@
 """Files that are whole at any moment, files that one writes and nobody else, folders likewise."""
 
+import errno
 import os
 import secrets
 import shutil
@@ -11,6 +12,7 @@ from pathlib import Path
 
 if sys.platform != "win32":
     import fcntl
+    import resource
 
 LOCK, PART = ".tca-mj.lock", ".tca-mj.part"
 
@@ -47,16 +49,45 @@ def append_whole(path: Path, content: bytes) -> None:
         OSError: If it cannot be written, with the name of the file.
     """
     with path.open("ab", buffering=0) as file:
-        size, left = file.tell(), memoryview(content)
+        size, left, whole = file.tell(), memoryview(content), False
         try:
             while left:
                 left = left[file.write(left) :]
             os.fsync(file.fileno())
-        except BaseException as error:
-            file.truncate(size)
-            if isinstance(error, OSError):
-                raise OSError(error.errno, error.strerror, str(path)) from error
-            raise
+            whole = True
+        except OSError as error:
+            raise OSError(error.errno, error.strerror, str(path)) from error
+        finally:
+            if not whole:
+                file.truncate(size)
+
+
+def require_room(path: Path, size: int, *, later: int = 0) -> None:
+    """Makes sure that a file can grow now, for those who do not say so if it cannot.
+
+    Args:
+        path: The file, which is left as it is.
+        size: By how many bytes; it is tried beside it.
+        later: For how many more the disk must have room; it is asked.
+
+    Raises:
+        OSError: If it cannot, with the name of the file.
+    """
+    held = path.stat().st_size if path.is_file() else 0
+    limit = sys.maxsize
+    if sys.platform != "win32":
+        limit = resource.getrlimit(resource.RLIMIT_FSIZE)[0]
+    over = limit != -1 and held + size + later > limit
+    number = errno.EFBIG if over else errno.ENOSPC
+    if over or shutil.disk_usage(path.parent).free < size + later:
+        raise OSError(number, os.strerror(number), str(path))
+    beside = path.with_name(f".{secrets.token_hex(8)}{PART}")
+    try:
+        beside.write_bytes(bytes(size))
+    except OSError as error:
+        raise OSError(error.errno, error.strerror, str(path)) from error
+    finally:
+        beside.unlink(missing_ok=True)
 
 
 class Claim:

@@ -257,6 +257,7 @@ class Run:
         self.test_env.close()
 
     def _show(self, kind: str, row: dict[str, float]) -> None:
+        self.folder.require_room()
         for name, value in row.items():
             self.board.add_scalar(f"{kind}/{name}", value, self.model.num_timesteps)
 

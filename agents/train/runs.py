@@ -15,12 +15,13 @@ import numpy as np
 
 from tca_mj.agents.output import read_json, write_json
 from tca_mj.agents.policies import Origin
-from tca_mj.files import write_whole
+from tca_mj.files import require_room, write_whole
 from tca_mj.machine import machine, versions
 
 RUN, STATE, CURVE, TENSORBOARD = "run.json", "state.pkl", "curve.csv", "tensorboard"
 _DIGEST = hashlib.sha256  # of the state, which it ends with
 _REMOVE = "remove it to begin the run anew, or take another folder"
+_ROOM = 1 << 18  # for points of curves [bytes]
 LIBRARIES = ("torch", "stable-baselines3", "cmaes")
 
 
@@ -97,10 +98,15 @@ class RunFolder:
         content = pickle.dumps(state, protocol=pickle.HIGHEST_PROTOCOL)
         write_whole(self.path / STATE, content + _DIGEST(content).digest())
 
+    def require_room(self) -> None:
+        """Raises OSError on a full disk: TensorBoard would say so from a thread of its own."""
+        require_room(self.path / TENSORBOARD, _ROOM)
+
     def tensorboard(self, step: int) -> Any:
         """A writer for TensorBoard that hides what an interrupted run wrote from ``step`` on.
 
-        What the state knows of ``step`` itself is to be written again.
+        What the state knows of ``step`` itself is to be written again; before anything is,
+        ``require_room``.
         """
         from torch.utils.tensorboard import SummaryWriter
 

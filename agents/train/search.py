@@ -274,6 +274,7 @@ class _Search:
 
     def show(self) -> None:
         """Shows the last row in TensorBoard, at the steps that the state stands at."""
+        self.folder.require_room()
         for name, value in self.state.rows[-1].items() if self.state.rows else ():
             self.board.add_scalar(f"search/{name}", value, self.state.steps)
         self.board.flush()

@@ -32,13 +32,17 @@ import rerun
 from numpy.typing import NDArray
 
 from tca_mj.checks import Array, require_count, require_positive
-from tca_mj.files import Claim
+from tca_mj.files import Claim, require_room
 from tca_mj.record import shapes
 from tca_mj.record.layout import QUANTITIES, Group, blueprint, groups, line_styles
 from tca_mj.record.plots import temperature_colour
 from tca_mj.record.render import Closing, Watched
 
 __all__ = ["QUANTITIES", "Recorded", "Recorder"]
+
+_FIRST, _MORE = 1 << 22, 1 << 20  # for geometry and layout; for a chunk besides its numbers [bytes]
+_CONTENTS = 1000  # of the table of contents, for each entity and chunk [bytes]
+_PATIENCE = 60.0  # until a file is given up that does not take what was sent [s]
 
 # What is sent, and as what.
 _POSITION = rerun.Transform3D.descriptor_translation(), rerun.components.Translation3DBatch
@@ -115,14 +119,14 @@ class Recorder(Closing):
         Raises:
             ValueError: If a number is not positive, or not whole where it counts, or another
                 recorder writes this file now, in this process or another one.
-            OSError, RuntimeError: If the file cannot be written.
+            OSError: If the file cannot be written.
         """
         require_count(every=every, chunk=chunk)
         if tca_radius is not None:
             require_positive(tca_radius=tca_radius)
         self.simulation, self.path = simulation, Path(path)
         self._every, self._chunk = every, chunk
-        self._calls = self._filled = 0
+        self._calls = self._filled = self._chunks = 0
         self._last, self._offset = simulation.time, 0.0
         self._closed = False
 
@@ -149,6 +153,7 @@ class Recorder(Closing):
         self._claim = Claim(self.path)
         self._stream = rerun.RecordingStream(application_id)
         try:
+            require_room(self.path, _FIRST)
             self._stream.save(self.path, write_footer=footer)
             centre, size = shapes.extent(model, simulation.data)
             self._stream.send_blueprint(
@@ -156,9 +161,10 @@ class Recorder(Closing):
             )
             for entity, content in self._static(paths, moving, tca_radius, size):
                 self._stream.log(entity, content, static=True, strict=True)
-            self._stream.flush()
+            self._flush()
         except BaseException:
             self._end()
+            self.path.unlink(missing_ok=True)  # nothing is recorded yet
             raise
 
     def frame(self, reward_terms: Mapping[str, float] | None = None) -> None:
@@ -254,6 +260,7 @@ class Recorder(Closing):
         Ctrl-C, it is sent again by ``close``, and a part twice rather than never.
         """
         k = self._filled
+        self._require_room()
         times = _times(self._clock[:k], self._steps[:k])
         if k:
             poses = zip(self._body_paths, self._position, self._quaternion, strict=True)
@@ -282,10 +289,29 @@ class Recorder(Closing):
         if self._events:
             at, steps, texts = zip(*self._events, strict=True)
             self._send("/events", _times(np.array(at), np.array(steps)), (_TEXT, texts))
-        self._stream.flush()
+        self._flush()
         self._filled = 0
         self._rewards.clear()
         self._events.clear()
+
+    def _require_room(self) -> None:
+        """Rerun loses what a full disk does not take, or waits for ever: it must not come to that.
+
+        There must be room for a chunk now, and for the table of contents in the end.
+        """
+        self._chunks += 1
+        numbers = self._position, self._quaternion, self._curves
+        lines = (strip.nbytes for strips in self._strips for strip in strips[: self._filled])
+        chunk = 2 * sum(each.nbytes for each in numbers) + sum(lines)
+        entities = self._bodies.size + len(self._paths) + len(self._lines)
+        require_room(self.path, _MORE + chunk, later=_CONTENTS * entities * self._chunks)
+
+    def _flush(self) -> None:
+        """Waits until what was sent is in the file."""
+        try:
+            self._stream.flush(timeout_sec=_PATIENCE)
+        except RuntimeError as error:
+            raise OSError(f"{self.path} cannot be written: {error}") from error
 
     def _send(self, path: str, times: list[rerun.TimeColumn], *columns: Any) -> None:
         made = [rerun.ComponentColumn(what, batch(values)) for (what, batch), values in columns]
