@@ -10,6 +10,7 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from tca_mj.checks import some
 from tca_mj.envs.hanging import hang
 from tca_mj.envs.options import Option, Options, Setup, Uniform, variation_options
 from tca_mj.envs.rewards import tolerance
@@ -46,6 +47,7 @@ _CLAMP = (-0.03, 0.0, 0.162)  # where the module hangs [m]
 # z of the module down, its TCA towards x of the world, wxyz.
 _HANGING = (0.0, math.sqrt(0.5), -math.sqrt(0.5), 0.0)
 _COLD, _HOT = np.array([0.86, 0.74, 0.48]), np.array([0.90, 0.25, 0.12])  # of the spine
+_EXACT = math.radians(1.0)  # error of an angle that does not count [rad]
 _APART = math.radians(20.0)  # least distance of a drawn start from the goal [rad]
 
 
@@ -138,7 +140,7 @@ class MorphModule(SimulatedTask):
         self.target = self.target_range[1]
         self._at_goal = 0
         self._find(self.model, part)
-        self._progress = self._measure()
+        self._progress = self._measure(self.angle)
 
     def _options(self) -> Options:
         return Options(
@@ -168,23 +170,25 @@ class MorphModule(SimulatedTask):
     def _find(self, model: mujoco.MjModel, part: Part) -> None:
         """Looks up the addresses of what is observed and set."""
         names = [name for name, _ in part.spines[0].joints]
-        self._bends = np.array([i for i, name in enumerate(names) if ".bend_x" in name])
-        joints = [model.joint(names[i]).id for i in self._bends]
-        self._bend_q, self._bend_v = model.jnt_qposadr[joints], model.jnt_dofadr[joints]
+        bends = np.array([".bend_x" in name for name in names])
+        joints = [model.joint(name).id for name, bend in zip(names, bends, strict=True) if bend]
+        self._bend_q = model.jnt_qposadr[joints]
+        # 1 for a bend, 0 for what else there is: among the spine's joints, positions, velocities.
+        self._bends, self._bent_q = bends.astype(np.float64), np.zeros(model.nq)
+        self._bent_v = np.zeros(model.nv)
+        self._bent_q[self._bend_q] = self._bent_v[model.jnt_dofadr[joints]] = 1.0
         geoms = [model.geom(i).name for i in range(model.ngeom)]
         self._polymer = np.flatnonzero([".polymer" in name for name in geoms])
 
     @property
     def angle(self) -> float:
         """Angle by which the module is bent, positive towards its TCA [rad]."""
-        return float(np.sum(self.data.qpos[self._bend_q]))
+        return float(self.data.qpos.dot(self._bent_q))
 
     @property
     def fixed_angle(self) -> float:
         """Angle that the spine would have at its present temperature without load [rad]."""
-        spines = self.sim.spines
-        assert spines.state is not None
-        return float(np.sum(spines.bank.spring(spines.state).reference[self._bends]))
+        return float(self.sim.spines.reference.dot(self._bends))
 
     def prepare(self, setup: Setup) -> None:
         """Bends the cold module to where it starts."""
@@ -195,27 +199,27 @@ class MorphModule(SimulatedTask):
 
         self.sim.reset(place)
         self._at_goal = 0
-        self._progress = self._measure()
+        self._progress = self._measure(self.angle)
 
     def drive(self, command: NDArray[np.float64]) -> Drive:
         """Voltage of the heater, what the TCA is told, and the fan; see the class."""
-        share = (command + 1.0) / 2.0
+        heater, _, fan = command.tolist()
         return Drive(
             command=self.heated(command[1:2]),
-            voltage=self.max_voltage * share[0],
-            fan=bool(command[2] > 0.0),
+            voltage=self.max_voltage * ((heater + 1.0) / 2.0),
+            fan=fan > 0.0,
         )
 
     def judge(self, drive: Drive, harmed: bool) -> Verdict:
         """How near the goal is, and how long the module has been there."""
-        off = not (self.sim.power.any() or drive.voltage or drive.fan)
-        before, self._progress = self._progress, self._measure()
+        off = not (drive.voltage or drive.fan or self.sim.power.any())
+        before, self._progress = self._progress, self._measure(self._bent)
         self._at_goal = self._at_goal + 1 if off and self._fixed() else 0
         held = self._at_goal * self.interval
         success = held > self.hold_time - 1e-9 and not harmed
         terms = {name: value - before[name] for name, value in self._progress.items()}
         terms["goal"] = 20.0 if success else 0.0
-        terms["damage"] = -10.0 if self.sim.spines.damaged.any() else 0.0
+        terms["damage"] = -10.0 if some(self.sim.spines.damaged) else 0.0
         return Verdict(
             terms=terms, success=success, seen={"time at the goal": min(held, self.hold_time)}
         )
@@ -223,40 +227,39 @@ class MorphModule(SimulatedTask):
     def _fixed(self) -> bool:
         """Whether the angle is the commanded one and the spine rigid."""
         rigid = self.sim.spines.temperature[0] < self.module_spec.spine.smp.rigid_below
-        return bool(rigid and abs(self.angle - self.target) <= self.tolerance)
+        return bool(rigid and abs(self._bent - self.target) <= self.tolerance)
 
-    def _measure(self) -> dict[str, float]:
-        """How far the task has got, by reward term."""
+    def _measure(self, angle: float) -> dict[str, float]:
+        """How far the task has got at an angle, by reward term."""
 
         def near(angle: float) -> float:
-            return float(
-                tolerance(
-                    abs(angle - self.target), bounds=(0.0, math.radians(1.0)), margin=math.pi,
-                    sigmoid="linear", value_at_margin=0.0,
-                )
+            return tolerance(
+                abs(angle - self.target), bounds=(0.0, math.radians(1.0)), margin=math.pi,
+                sigmoid="linear", value_at_margin=0.0,
             )  # fmt: skip
 
         self._keeps = self.fixed_angle
-        return {"reach": near(self.angle), "fix": 4.0 * near(self._keeps)}
+        return {"reach": near(angle), "fix": 4.0 * near(self._keeps)}
 
     def observe(self) -> dict[str, ArrayLike]:
         """See ``OBSERVATION``."""
         sim = self.sim
+        self._bent = self.angle
         return {
             "spine temperature": sim.spines.temperature,
             "TCA temperature": sim.temperature,
             "TCA length": sim.length,
             "TCA resistance": sim.resistance,
             "TCA tension": sim.tension,
-            "angle": self.angle,
-            "angular velocity": float(np.sum(self.data.qvel[self._bend_v])),
+            "angle": self._bent,
+            "angular velocity": self.data.qvel.dot(self._bent_v),
             "commanded angle": self.target,
             "time at the goal": min(self._at_goal * self.interval, self.hold_time),
         }
 
     def harm(self) -> str | None:
         """What the module does not survive, or None."""
-        if self.sim.spines.damaged.any():
+        if some(self.sim.spines.damaged):
             return "damaged: the TCA contracted against a stiff spine"
         if self.sim.spines.temperature[0] > self.max_spine_temperature:
             return f"overheated: spine above {self.max_spine_temperature} °C"
@@ -264,7 +267,7 @@ class MorphModule(SimulatedTask):
 
     def details(self) -> dict[str, Any]:
         """The commanded, the present and the fixed angle [rad]."""
-        return {"target": self.target, "angle": self.angle, "fixed_angle": self._keeps}
+        return {"target": self.target, "angle": self._bent, "fixed_angle": self._keeps}
 
     def bent(self) -> float:
         """See ``angle``."""

@@ -10,6 +10,8 @@ import numpy as np
 from gymnasium.spaces import Box
 from numpy.typing import ArrayLike, NDArray
 
+from tca_mj.checks import every
+
 
 @dataclass(frozen=True, slots=True)
 class Entry:
@@ -66,6 +68,7 @@ class Table:
             self.slices[entry.name] = slice(start, start + entry.size)
             start += entry.size
         self.size = start
+        self._sizes = tuple((entry.name, entry.size) for entry in self.entries)
         sizes = [entry.size for entry in self.entries]
         self._low = np.repeat([e.low for e in self.entries], sizes).astype(np.float32)
         self._high = np.repeat([e.high for e in self.entries], sizes).astype(np.float32)
@@ -132,12 +135,14 @@ class Table:
         """
         if values.keys() != self.slices.keys():
             raise ValueError(f"values must be {sorted(self.slices)}, got {sorted(values)}")
-        rows = [np.ravel(values[entry.name]) for entry in self.entries]
-        for entry, row in zip(self.entries, rows, strict=True):
-            if row.size != entry.size:
-                raise ValueError(f"{entry.name} must have {entry.size} numbers, got {row.size}")
-        with np.errstate(over="ignore"):  # what has diverged is found to be infinite
-            return np.concatenate(rows, dtype=np.float32, casting="same_kind")
+        flat: list[float] = []
+        for name, size in self._sizes:
+            row = values[name]
+            each = [row] if isinstance(row, float) else np.asarray(row).ravel().tolist()
+            if len(each) != size:
+                raise ValueError(f"{name} must have {size} numbers, got {len(each)}")
+            flat += each
+        return np.array(flat, dtype=np.float32)
 
     def read(self, array: NDArray[Any]) -> dict[str, NDArray[Any]]:
         """The rows of an array of shape (..., size), by name."""
@@ -145,10 +150,10 @@ class Table:
 
     def outside(self, array: NDArray[Any]) -> list[str]:
         """Names of the rows that are not finite or out of their bounds."""
-        good = (array >= self._low) & (array <= self._high)  # false for what is not a number
-        if good.all():
+        low, high = array >= self._low, array <= self._high  # false for what is not a number
+        if every(low) and every(high):
             return []
-        bad = ~good
+        bad = ~(low & high)
         return [name for name, where in self.slices.items() if bad[where].any()]
 
     def bounded(self, array: NDArray[Any]) -> NDArray[np.float32]:
@@ -175,8 +180,24 @@ def numbers(name: str, value: Any, shape: tuple[int, ...]) -> NDArray[np.float64
     """``value`` as real, finite numbers of the given shape, or a ``ValueError`` that names it."""
     try:
         array = np.asarray(value)
-        if array.shape == shape and array.dtype.kind in "iuf" and np.isfinite(array).all():
+        if array.shape == shape and array.dtype.kind in "iuf" and every(np.isfinite(array)):
             return array.astype(np.float64)
     except (TypeError, ValueError):
         pass
     raise ValueError(f"{name} must be finite numbers of shape {shape}, got {value!r}")
+
+
+def commands(name: str, value: Any, shape: tuple[int, ...]) -> NDArray[np.float64]:
+    """Actions as numbers within -1 and 1; beyond by a rounding they are on the bound.
+
+    Raises:
+        ValueError: If they have another shape, are not finite or out of bounds.
+    """
+    if type(value) is np.ndarray and value.shape == shape and value.dtype.kind == "f":
+        command = value.astype(np.float64)
+        if every(np.abs(command) <= 1.0):
+            return command
+    command = numbers(name, value, shape)
+    if np.abs(command).max() > 1.0 + 1e-6:
+        raise ValueError(f"{name} must be within -1 and 1, got {command}")
+    return np.clip(command, -1.0, 1.0)

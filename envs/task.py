@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from copy import deepcopy
@@ -13,9 +14,9 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tca_mj.checks import number
+from tca_mj.checks import number, some
 from tca_mj.envs.options import Option, Options, Setup, variation_of, variation_options
-from tca_mj.envs.table import Entry, Table, numbers
+from tca_mj.envs.table import Entry, Table, commands, numbers
 from tca_mj.model.part import Part
 from tca_mj.record.render import Offscreen, colour_tendons
 from tca_mj.sim import Drive, Simulation, SimulationDiverged, SimulationOverheated
@@ -82,7 +83,7 @@ class TaskState:
 _VALUES = (bool, int, float, str, tuple, dict, np.ndarray, np.generic)
 _BUILT = (
     "render_mode", "_camera", "_size", "spec", "metadata",
-    "heating", "control_period", "interval", "repeats", "share",
+    "heating", "control_period", "interval", "repeats", "share", "_off", "_half_range",
 )  # fmt: skip
 HEATINGS = ("temperature", "power")  # what a number of an action means to a TCA
 
@@ -110,10 +111,10 @@ class SimulatedTask(gym.Env[Observation, Action], ABC):
     """A task that runs a ``Simulation``; its heirs say what is seen, done and paid for.
 
     The episode is run here, in one order. ``reset`` draws the options, varies the robot and has
-    the heir ``prepare`` it. A step is ``begin``, in which the heir says what the action does to
-    the simulation (``drive``), then the simulation, then ``finish``: has the simulation broken
+    the heir ``prepare`` it. A step is ``drive``, in which the heir says what the action does to
+    the simulation, then the simulation, then ``finish``: has the simulation broken
     off, is something seen out of its bounds, is a TCA damaged (``harm``), what has been earned and
-    is the episode over (``judge``). A vector environment calls begin and finish for each of its
+    is the episode over (``judge``). A vector environment calls drive and finish for each of its
     tasks and lets all simulations run between them.
 
     A task has an ``__init__`` of its own, or says in its class what it is made of: ``scene``,
@@ -215,6 +216,8 @@ class SimulatedTask(gym.Env[Observation, Action], ABC):
     _camera: str
     _size: tuple[int, int]
     _screen: Offscreen | None = None
+    _off: NDArray[np.float64]
+    _half_range: float | NDArray[np.float64]
 
     def __init__(
         self, *, spec: Any = None, timestep: float = 5e-3, **common: Unpack[TaskArguments]
@@ -289,7 +292,10 @@ class SimulatedTask(gym.Env[Observation, Action], ABC):
             )
         self.share = self.interval / own  # of a price per step that each judgement takes
         self.metadata = {**self.metadata, "render_fps": max(1, round(1.0 / self.control_period))}
+        self._off, self._half_range = np.zeros(sim.n), self.max_power / 2.0  # what TCAs are told
         if heating == "temperature":
+            self._off = np.full(sim.n, AMBIENT)
+            self._half_range = (self.safe_temperature - AMBIENT) / 2.0
             row = commands.slices["TCA heating"]
             power = np.ones(sim.n)  # those that no action drives are off
             power[: row.stop - row.start] = self.max_power
@@ -305,11 +311,8 @@ class SimulatedTask(gym.Env[Observation, Action], ABC):
         Args:
             command: Of the first TCAs, from -1 to 1; the others are off.
         """
-        warm = self.heating == "temperature"
-        low, high = (AMBIENT, self.safe_temperature) if warm else (0.0, self.max_power)
-        told = np.full(self.sim.n, low)
-        told[: command.size] += (high - low) * ((command + 1.0) / 2.0)
-        return told
+        warm = (command + 1.0) * self._half_range + self._off[: command.size]
+        return warm if warm.size == self.sim.n else np.append(warm, self._off[warm.size :])
 
     def prepare(self, setup: Setup) -> None:
         """Begins an episode: resets the simulation and puts everything where it starts.
@@ -369,7 +372,8 @@ class SimulatedTask(gym.Env[Observation, Action], ABC):
     @property
     def energy(self) -> float:
         """Electrical energy put into TCAs and heaters since the reset [J]."""
-        return float(self.sim.energy.sum() + self.sim.spines.energy.sum())
+        energy, spines = np.add.reduce(self.sim.energy), self.sim.spines
+        return float(energy + np.add.reduce(spines.energy) if spines.n else energy)
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -385,18 +389,14 @@ class SimulatedTask(gym.Env[Observation, Action], ABC):
         self._nominal.apply(variation)
         self._varied = asdict(variation)
         self.prepare(setup)
-        return self.seen(), self._info(success=False)
-
-    def begin(self, command: NDArray[np.float64]) -> Drive:
-        """What drives the simulation in this step; errors as ``drive``."""
         self._used = self.energy
-        return self.drive(command)
+        return self.seen(), self._info(success=False)
 
     def finish(self, drive: Drive, error: SimulationDiverged | None) -> Outcome:
         """What the step has led to; see the class.
 
         Args:
-            drive: What ``begin`` returned.
+            drive: What ``drive`` returned.
             error: Why the simulation broke off, or None.
         """
         table, sim = self.observation, self.sim
@@ -415,14 +415,16 @@ class SimulatedTask(gym.Env[Observation, Action], ABC):
             success, ended = verdict.success, verdict.ended
             for name, value in verdict.seen.items():
                 observation[table.slices[name]] = value
-            excess = np.maximum(sim.temperature - self.hot_temperature, 0.0)
-            if self.heat_price:
-                terms["heat"] = -self.heat_price * self.share * float(np.sum(excess))
-            if self.hot_temperature < self.max_temperature:
-                cost = float(np.sum(excess)) / (self.max_temperature - self.hot_temperature)
+            if math.isfinite(self.hot_temperature):
+                excess = float(np.maximum(sim.temperature - self.hot_temperature, 0.0).sum())
+                if self.heat_price:
+                    terms["heat"] = -self.heat_price * self.share * excess
+                if self.hot_temperature < self.max_temperature:
+                    cost = excess / (self.max_temperature - self.hot_temperature)
             if self.end_price and (reason or ended):
                 terms["end"] = -self.end_price
-        terms["energy"] = -self.energy_price * (self.energy - self._used)
+        used, self._used = self._used, self.energy
+        terms["energy"] = -self.energy_price * (self._used - used)
         info = {"reward_terms": terms, "cost": cost + (reason is not None)}
         info |= self._info(success=success)
         if reason is not None:
@@ -472,11 +474,11 @@ class SimulatedTask(gym.Env[Observation, Action], ABC):
         """What the robot does not survive, or None."""
         sim = self.sim
         hot = sim.temperature > self.max_temperature
-        if hot.any():
+        if some(hot):
             name = sim.tca_names[int(np.argmax(hot))]
             return f"overheated: {name} above {self.max_temperature} °C"
         torn = sim.tension > sim.bank.breaking_force
-        if torn.any():
+        if some(torn):
             i = int(np.argmax(torn))
             return f"torn: {sim.tca_names[i]} above {sim.bank.breaking_force[i]} N"
         return None
@@ -491,7 +493,7 @@ class SimulatedTask(gym.Env[Observation, Action], ABC):
             "body_temperature": sim.body_temperature.copy(),
             "spine_temperature": sim.spines.temperature.copy(),
             "extrapolated": sim.extrapolated,
-            "tension": sim.tension.copy(),
+            "tension": sim.tension,
             "damaged": sim.spines.damaged.copy(),
             "variation": self._varied.copy(),
             "success": success,
@@ -504,10 +506,7 @@ class SimulatedTask(gym.Env[Observation, Action], ABC):
         Raises:
             ValueError: If the action has the wrong shape, is not finite or out of [-1, 1].
         """
-        command = numbers("action", action, self.action_space.shape or ())
-        if np.abs(command).max() > 1.0 + 1e-6:
-            raise ValueError(f"action must be within -1 and 1, got {command}")
-        return np.clip(command, -1.0, 1.0)
+        return commands("action", action, self.action_space.shape or ())
 
     def step(self, action: Action) -> Outcome:
         """Runs the simulation for ``control_period``, or until the episode ends; see the class.
@@ -517,7 +516,7 @@ class SimulatedTask(gym.Env[Observation, Action], ABC):
         """
         command, outcome = self.command(action), None
         for _ in range(self.repeats):
-            drive = self.begin(command)
+            drive = self.drive(command)
             error = None
             try:
                 self.sim.step(drive.command, self.interval, voltage=drive.voltage, fan=drive.fan)

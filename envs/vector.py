@@ -22,7 +22,7 @@ from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
 from tca_mj.batch import SimulationBatch
-from tca_mj.envs.table import numbers
+from tca_mj.envs.table import commands
 from tca_mj.envs.task import Observation, Outcome, SimulatedTask, together
 
 Options = Mapping[str, Any] | None
@@ -140,10 +140,7 @@ class TaskVector(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[Any
             ClosedEnvironmentError: If the environment is closed.
         """
         self._must_be_open()
-        commands = numbers("actions", actions, self.action_space.shape or ())
-        if np.abs(commands).max() > 1.0 + 1e-6:
-            raise ValueError(f"actions must be within -1 and 1, got {commands}")
-        commands = np.clip(commands, -1.0, 1.0)
+        told = commands("actions", actions, self.action_space.shape or ())
         stepped = np.ones(self.num_envs, dtype=bool) if which is None else which
         if (self._elapsed[stepped] < 0).any():
             raise ResetNeeded("the tasks must be reset before the first step")
@@ -151,8 +148,8 @@ class TaskVector(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[Any
         outcomes: list[Outcome | None] = [None] * self.num_envs
         for _ in range(first.repeats):
             drives = [
-                env.begin(command) if go else None
-                for env, command, go in zip(self.envs, commands, going, strict=True)
+                env.drive(command) if go else None
+                for env, command, go in zip(self.envs, told, going, strict=True)
             ]
             errors = batch.step(drives, first.interval)
             for i, (env, drive, error) in enumerate(zip(self.envs, drives, errors, strict=True)):

@@ -238,6 +238,10 @@ class MixedBank:
         ]
         return self._state([part for part, _ in done]), self._pulls([pull for _, pull in done])
 
+    def warmed(self, state: MixedState, command: Array, length: Array, dt: float) -> MixedState:
+        """The state that ``advance`` leads to."""
+        return self.advance(state, command, length, dt)[0]
+
     def pull(self, state: MixedState, length: Array) -> Pull:
         """As each kind's."""
         return self._pulls(
@@ -246,6 +250,10 @@ class MixedBank:
                 for (places, bank), part in zip(self.kinds, state.parts, strict=True)
             ]
         )
+
+    def pulls(self, states: Sequence[MixedState], length: Array) -> list[Pull]:
+        """``pull`` of several states at one length."""
+        return [self.pull(state, length) for state in states]
 
     def resistance(self, state: MixedState, length: Array, *, strict: bool = True) -> Array:
         """Resistance of the TCAs, not a number for other kinds, shape (..., n) [ohm]."""

@@ -64,6 +64,8 @@ def floats(name: str, values: ArrayLike, *, empty: bool = False) -> Array:
     """
     if type(values) is np.ndarray and values.dtype == np.float64:
         return values
+    if type(values) is float:
+        return np.array(values)
     try:
         array = np.asarray(values)
         listed = not isinstance(values, np.ndarray)
@@ -76,6 +78,16 @@ def floats(name: str, values: ArrayLike, *, empty: bool = False) -> Array:
         raise ValueError(
             f"{name} must be a real number or an array of them, got {shown(values)}"
         ) from error
+
+
+def every(flags: Any) -> bool:
+    """Whether all flags of an array hold: as its ``all``, in a tenth of the time for a few."""
+    return 0 not in flags.tobytes()
+
+
+def some(flags: Any) -> bool:
+    """Whether one flag of an array holds: as its ``any``, in a tenth of the time for a few."""
+    return 1 in flags.tobytes()
 
 
 def within(
@@ -106,13 +118,13 @@ def within(
     if shape is not None and array.shape != shape:
         kind = f"finite numbers of shape {shape}" if shape else "one finite number"
         raise ValueError(f"{name} must be {kind}, got {shown(values)}")
-    if not array.size:
-        return array
-    least, most = float(array.min()), float(array.max())  # not a number if one is none
-    if (
-        least >= -LARGEST and most <= LARGEST
-        and above < least >= at_least and below > most <= at_most
-    ):  # fmt: skip
+    least, most = max(at_least, -LARGEST), min(at_most, LARGEST)
+    if array.size == 1:
+        good = above < (one := array.item()) >= least and below > one <= most
+    else:
+        low = array > above if above >= least else array >= least
+        good = every(low) and every(array < below if below <= most else array <= most)
+    if good:
         return array
     bounds = {"above": above, "at least": at_least, "below": below, "at most": at_most}
     said = [f"{word} {bound:.6g}" for word, bound in bounds.items() if math.isfinite(bound)]

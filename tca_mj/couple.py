@@ -15,7 +15,7 @@ decide; a first step from rest differs by a tenth between the two. Every TCA the
 1e-10 N more than its law, far above any rounding and far below any weight: at rest it is taut.
 """
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,8 +30,7 @@ Flags = NDArray[np.bool_]
 _TAUT = 1e-10  # tension added to each TCA's law, so that at rest it is taut [N]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Inputs:
+class Inputs(NamedTuple):
     """What drives TCAs and spines for a period.
 
     Attributes:
@@ -45,20 +44,10 @@ class Inputs:
     fan: Flags
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Writes:
-    """What a model gets until the next period.
-
-    Attributes:
-        constant, slope: Of the actuators, affine in the tendons' lengths, shape (..., n) [N, N/m].
-        stiffness, reference, damping: Of the joints of the cells, shape (..., j) each.
-    """
-
-    constant: Array
-    slope: Array
-    stiffness: Array
-    reference: Array
-    damping: Array
+Writes = tuple[Array, Array, Array, Array]
+"""What a model gets until the next period: forces of the actuators, affine in the tendons' lengths,
+constants and then slopes, shape (..., 2 n) [N, N/m]; stiffness, reference and damping of the joints
+of the cells, shape (..., j) each."""
 
 
 def measure(
@@ -99,12 +88,14 @@ def advance(
     Raises:
         ValueError, TcaMelted, CoilSolveError: As ``TcaBank.advance``.
     """
-    later, pull = bank.advance(tca, inputs.command, length, period)
-    tension = gain * pull.tension
-    if spines.n:
-        rise = gain * ((pull.tension - bank.pull(tca, length).tension) / period)
-        spines.advance(inputs.voltage, inputs.fan, motion, tension, rise, period)
-    return later, Pull(tension, gain * pull.stiffness, pull.length)
+    if not spines.n:
+        later, pull = bank.advance(tca, inputs.command, length, period)
+        return later, Pull(pull.tension * gain, pull.stiffness * gain, length)
+    later = bank.warmed(tca, inputs.command, length, period)
+    before, pull = bank.pulls((tca, later), length)
+    tension, rise = pull.tension * gain, (pull.tension - before.tension) / period * gain
+    spines.advance(inputs.voltage, inputs.fan, motion, tension, rise, period)
+    return later, Pull(tension, pull.stiffness * gain, length)
 
 
 def write(
@@ -130,10 +121,6 @@ def write(
     """
     tension = np.maximum(pull.tension, 0.0)
     stiffness, reference = body.springs(strained, tension, tendon_slope, qpos)
-    return Writes(
-        constant=-(pull.tension + _TAUT) + pull.stiffness * tendon_length,
-        slope=-pull.stiffness,
-        stiffness=stiffness,
-        reference=reference,
-        damping=body.damped(strained, tension, steadiness),
-    )
+    constant = pull.stiffness * tendon_length - (pull.tension + _TAUT)
+    force = np.concatenate((constant, -pull.stiffness), axis=-1)
+    return force, stiffness, reference, body.damped(strained, tension, steadiness)

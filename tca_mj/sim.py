@@ -10,6 +10,7 @@ do the work that this length says: see ``tca_mj.model.smooth``.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -20,7 +21,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tca_mj.actuation import Group, MixedBank, Signal, muscle_group
-from tca_mj.checks import NotNegative, Numbers, Positive, door, number, require_one_of
+from tca_mj.checks import NotNegative, Numbers, Positive, door, every, number, require_one_of
 from tca_mj.couple import Inputs, Writes, advance, measure, write
 from tca_mj.model.build import stage
 from tca_mj.model.mujoco_warnings import count_warnings
@@ -170,6 +171,9 @@ class Simulation:
         self.actuator = np.array(
             [model.actuator(name).id for name in self.tca_names], dtype=np.int64
         )
+        # Where the model keeps the constants and then the slopes of their forces.
+        width = model.actuator_biasprm.shape[1]
+        self._force = np.concatenate((width * self.actuator, width * self.actuator + 1))
 
         self.body = SmoothBody(model, part.tcas)
         # What is renewed only every period needs more damping than the time step (by trial).
@@ -182,7 +186,7 @@ class Simulation:
         self.data.qpos[address] = model.qpos_spring[address]
         self._start = self.data.qpos.copy()
         rest = np.array([tca.spec.rest_length + tca.stretch for tca in part.tcas])
-        self.length_offset = np.zeros(self.n)
+        self.length_offset = self._zeros = np.zeros(self.n)
         self.length_offset = rest - self.length
         self.tca: TcaState
         self.pull: Pull
@@ -315,7 +319,7 @@ class Simulation:
 
         It is 1e-10 N above the law's, see ``tca_mj.couple``.
         """
-        return 0.0 - self.data.actuator_force[self.actuator]
+        return self._zeros - self.data.actuator_force.take(self.actuator)
 
     @property
     def resistance(self) -> NDArray[np.float64]:
@@ -503,21 +507,20 @@ class Simulation:
         self.take(
             write(
                 self.body, self.strained, pull, qpos=data.qpos,
-                tendon_length=data.ten_length[self.tendon], tendon_slope=data.ten_J,
+                tendon_length=data.ten_length.take(self.tendon), tendon_slope=data.ten_J,
                 steadiness=self.steadiness,
             )
         )  # fmt: skip
 
     def take(self, writes: Writes) -> None:
         """Writes what ``tca_mj.couple.write`` computes to the model."""
-        prm = self.model.actuator_biasprm
-        prm[self.actuator, 0] = writes.constant
-        prm[self.actuator, 1] = writes.slope
-        self.body.set_springs(writes.stiffness, writes.reference)
-        self.body.set_damping(writes.damping)
+        force, stiffness, reference, damping = writes
+        self.model.actuator_biasprm.put(self._force, force)
+        self.body.set_springs(stiffness, reference)
+        self.body.set_damping(damping)
 
     def _check_length(self, length: NDArray[np.float64], inside: NDArray[np.bool_]) -> None:
-        if not inside.all():
+        if not every(inside):
             self._check()
             i = int(np.argmin(inside))
             raise SimulationDiverged(
@@ -527,9 +530,11 @@ class Simulation:
 
     def _check(self) -> None:
         data = self.data
-        number = data.warning.number
-        bad = [name for warning, name in DIVERGENCE.items() if number[warning] > 0]
-        if bad or not (np.isfinite(data.qpos).all() and np.isfinite(data.qvel).all()):
+        number, q, v = data.warning.number.tolist(), data.qpos, data.qvel
+        if not any(number) and math.isfinite(q.dot(q) + v.dot(v)):
+            return
+        bad = [name for warning, name in DIVERGENCE.items() if number[warning]]
+        if bad or not (every(np.isfinite(q)) and every(np.isfinite(v))):
             names = ", ".join(bad) or "not finite"
             raise SimulationDiverged(
                 f"the state diverged at {data.time:.3f} s ({names}); a smaller timestep or less"

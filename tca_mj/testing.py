@@ -111,11 +111,12 @@ def check_reward(id: str) -> None:
     task = _task(id)
     task.reset(seed=1)
     for action in _actions(task, 10):
+        before = task.energy
         _, reward, _, _, info = task.step(action)
         assert set(info["reward_terms"]) == set(task.terms), "terms are not those of the class"
         assert math.isclose(reward, sum(info["reward_terms"].values()), abs_tol=1e-12)
         assert info["cost"] >= 0.0
-    joules = task.energy - task._used
+    joules = task.energy - before
     assert math.isclose(
         info["reward_terms"]["energy"], -task.energy_price * joules, abs_tol=1e-12
     ), "the energy is not charged as said"

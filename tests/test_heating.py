@@ -126,7 +126,7 @@ def test_a_control_period_can_be_any_number_of_updates(period):
     env.data.qpos[3:7] = [0.9, 0.0, np.sqrt(1.0 - 0.9**2), 0.0]
     mujoco.mj_kinematics(env.model, env.data)
     tilt = 1.0 - env.stance.rotation(env.data)[2, 2]
-    leaning = env.judge(env.begin(np.zeros(12)), False).terms["posture"]  # after 0.05 s
+    leaning = env.judge(env.drive(np.zeros(12)), False).terms["posture"]  # after 0.05 s
     assert leaning == pytest.approx(-0.2 * 0.5 * tilt) and tilt > 0.1
 
 

@@ -122,10 +122,10 @@ def test_edges_of_the_table_are_inside():
     for spec in SPECS:
         coils = CoilSurfaces([spec])
         for temperature in (coils.coldest, coils.hottest):
-            read = coils._read(coils.longest, temperature)
+            read = coils.tension(coils.longest, temperature)
             exact = coils.rods.tension(coils.longest, temperature)
             np.testing.assert_allclose(read, exact, rtol=1e-9)
-            read = coils._read(coils.shortest, temperature)  # inside of a cell
+            read = coils.tension(coils.shortest, temperature)  # inside of a cell
             exact = coils.rods.tension(coils.shortest, temperature)
             np.testing.assert_allclose(read, exact, rtol=1e-4)
 

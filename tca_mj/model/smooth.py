@@ -17,9 +17,10 @@ Nothing here is rounded by a matrix product, whose order of summation depends on
 in a batch has, bit for bit, what it has alone.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from copy import copy
-from dataclasses import dataclass
+from functools import partial
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
@@ -27,12 +28,12 @@ from numpy.typing import NDArray
 
 from tca_mj.checks import Array
 from tca_mj.model.chain import MOTIONS, Chain, Motion
-from tca_mj.model.curves import Curves, rows, summed
+from tca_mj.model.curves import Curves
+from tca_mj.model.sums import Form, Places, Total, rows
 from tca_mj.model.tendon import Crossing, RoutedTca
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Strained:
+class Strained(NamedTuple):
     """Cells and TCAs at some positions of the joints.
 
     Attributes:
@@ -41,8 +42,7 @@ class Strained:
         each: Its length in each crossing, shape (..., crossings) [m].
         slope: Derivatives of the length of each crossing by its cell's motion, shape
             (..., 4, crossings).
-        sine: Sine of half the angles of the hinges, shape (..., 3, cells).
-        cosine: Cosine of them, same shape.
+        half: Sines of half the angles of the hinges, then cosines, shape (..., 6 cells).
         cotangent: Half of each cell's angle times the cotangent of it, shape (..., cells).
     """
 
@@ -50,8 +50,7 @@ class Strained:
     length: Array
     each: Array
     slope: Array
-    sine: Array
-    cosine: Array
+    half: Array
     cotangent: Array
 
 
@@ -88,9 +87,11 @@ class SmoothBody:
         self._tca = np.array([i for i, tca in enumerate(tcas) for _ in tca.crossings], np.int64)
         self._cell = np.array([number[tuple(c.joints.values())] for c in crossings], np.int64)
         self._read_cells(list(cells.values()))
-        self._curves, self._tcas = Curves(crossings, self._cell), len(tcas)
-        # Where the motions of each crossing's cell are, shape (4 crossings,).
-        self._cells = (np.arange(len(MOTIONS))[:, None] * self._shape[1] + self._cell).ravel()
+        self._curves = Curves(crossings, self._cell, self._shape[1])
+        self._lengths, self._twists = Total(self._tca, len(tcas)), Total(self._cell, self._shape[1])
+        motions = rows(0, 1, 2, 3, width=self._shape[1], columns=self._cell)
+        self._pulling = np.tile(self._tca, 4)
+        self._pulls = Total(motions, 4 * self._shape[1])
         self._read_tendons([model.tendon(tca.name).id for tca in tcas])
         self._read_polylines(crossings)
         self.rest = self.at(model.qpos_spring).motion.copy()
@@ -115,22 +116,52 @@ class SmoothBody:
         """Which joint is which motion of which cell."""
         model, shape = self._model, (len(MOTIONS), len(cells))
         joint = np.full(shape, -1)
-        self._order = np.ones(len(cells))  # -1 where the order of the joints is reversed
+        order = np.ones(len(cells))  # -1 where the order of the joints is reversed
         for i, joints in enumerate(cells):
             for motion, name in joints.items():
                 joint[MOTIONS.index(motion), i] = model.joint(name).id
             if [motion for motion in MOTIONS if motion in joints] != list(joints):
-                self._order[i] = -1.0
-        self._half, self._twice = 0.5 * self._order, 2.0 * self._order
+                order[i] = -1.0
+        self._half, self._twice = np.tile(0.5 * order, 3), 2.0 * order
         self._shape = shape
+        self._read_turns(np.tile(order, 3), partial(rows, width=len(cells)))
         self.damping, self.stiffness = np.zeros((2, *shape))
         self._where = np.flatnonzero(joint >= 0)
-        # A slice where no motion is left out: a view instead of a copy.
-        self._held = slice(None) if len(self._where) == joint.size else self._where
         self._joint = joint.ravel()[self._where]
+        # Whether each cell has one hinge, about whose axis it turns; of each joint its cell, the
+        # bend by a quarter of whose square it twists the cell, and whether it is the twist.
+        self._planar = bool(((joint[1:] >= 0).sum(axis=0) <= 1).all())
+        row, self._column = np.divmod(self._where, len(cells))
+        self._across = np.array([0, 2, 1, 0])[row] * len(cells) + self._column
+        self._quarter, self._along = 0.25 * ((row == 1) | (row == 2)), 1.0 * (row == 3)
         self._qpos, self._dof = model.jnt_qposadr[self._joint], model.jnt_dofadr[self._joint]
         self.damping.flat[self._where] = model.dof_damping[self._dof]
         self.stiffness.flat[self._where] = model.jnt_stiffness[self._joint]
+
+    def _read_turns(self, order: Array, row: Callable[..., Places]) -> None:
+        """The products that rotations of cells are made of.
+
+        Args:
+            order: -1 for each row of a vector of cells whose joints' order is reversed.
+            row: Where rows of cells are.
+        """
+        size = order.size // 3
+        self._thrice = row(0, 0, 0)
+        self._one, self._small, self._tiny = np.full((3, size), [[1.0], [1e-9], [1e-300]])
+        self._square = Total(self._thrice, size)
+        # Of sines of x, y, z (rows 0 to 2) and cosines (3 to 5): those of x and y, and with z.
+        self._xs, self._ys = row(0, 0, 3, 3), row(1, 4, 1, 4)
+        signs = (1.0, 1.0, 1.0, 1.0, 1.0, -1.0, 1.0, -1.0)
+        factors = row(1, 2, 3, 3, 2, 1, 0, 0), row(5, 5, 2, 5, 2, 2, 5, 2)
+        self._quaternion = Form(row(0, 1, 2, 3, 0, 1, 2, 3), signs, *factors, size=4 * size)
+        # Of motions and loads, t and m in rows 1 to 3 and 5 to 7: t t, t m, -t × m/2.
+        half = np.concatenate((np.ones(6 * size), -0.5 * order, 0.5 * order))
+        factors = row(1, 2, 3, 1, 2, 3, 2, 3, 1, 3, 1, 2), row(1, 2, 3, 5, 6, 7, 7, 5, 6, 6, 7, 5)
+        to = row(0, 0, 0, 1, 1, 1, 2, 3, 4, 2, 3, 4)
+        self._products = Form(to, half, *factors, size=5 * size)
+        # Of cosines and sines of y, z and a vector: its turn about z.
+        factors = row(1, 3, 3, 1), row(0, 0, 1, 1)
+        self._turned = Form(row(0, 1, 0, 1), (1.0, 1.0, -1.0, 1.0), *factors, size=2 * size)
 
     def _read_tendons(self, tendons: Sequence[int]) -> None:
         """Where MuJoCo keeps the tendons' derivatives by the cells' joints, in a sparse matrix."""
@@ -142,7 +173,8 @@ class SmoothBody:
             for k in range(first, first + int(model.ten_J_rownnz[tendon]))
             if int(model.ten_J_colind[k]) in joint
         ]
-        self._entries = np.array(entries, dtype=np.int64).reshape(-1, 3).T
+        entry, tca, moved = np.array(entries, dtype=np.int64).reshape(-1, 3).T
+        self._entries = Form(moved, 1.0, tca, entry, size=len(self._dof))
 
     def _read_polylines(self, crossings: Sequence[Crossing]) -> None:
         """Stiffness that the polylines have by changing their direction.
@@ -157,46 +189,51 @@ class SmoothBody:
                 polyline[i, MOTIONS.index(motion)] = curving
         length, curved = self._curves.straight()
         self._twist = polyline[:, MOTIONS.index("twist")] * length
-        total = np.zeros((*self._shape, self._tcas))
+        total = np.zeros((*self._shape, self._lengths.size))
         bends = [MOTIONS.index("bend_x"), MOTIONS.index("bend_y")]
         for bend, more in zip(bends, curved - polyline[:, bends].T, strict=True):
             np.add.at(total[bend], (self._cell, self._tca), more)
         total = total[np.unravel_index(self._where, self._shape)]
         joint, tca = np.nonzero(total)
-        self._more = joint, tca, total[joint, tca]
+        self._more = Form(joint, total[joint, tca], tca, size=len(total))
+
+    def at(self, qpos: Array) -> Strained:
+        """Cells and TCAs at the positions ``qpos`` of the model's joints."""
+        position = qpos.take(self._qpos, axis=-1)
+        key = position.tobytes()  # bits: 0 and -0 are not the same
+        if self._last is None or key != self._last[0]:
+            self._last = key, self._strained(position)
+        return self._last[1]
 
     @np.errstate(invalid="ignore", over="ignore")  # a diverged state has no shape
-    def at(self, qpos: Array) -> Strained:
-        """Cells and TCAs at the positions ``qpos`` of the model's joints.
+    def _strained(self, position: Array) -> Strained:
+        """Cells and TCAs at positions of the cells' joints, shape (..., j).
 
         The hinges of a cell turn about x, y, z in this order: the product of three quaternions.
         In the reversed order they turn the reversed way if the angles are reversed.
         """
-        position = qpos.take(self._qpos, axis=-1)
-        key = position.tobytes()  # bits: 0 and -0 are not the same
-        if self._last is not None and key == self._last[0]:
-            return self._last[1]
-        lead = position.shape[:-1]
-        motion = np.zeros((*lead, self._shape[0] * self._shape[1]))
-        motion[..., self._held] = position
-        motion = motion.reshape(*lead, *self._shape)
-        angles = self._half * motion[..., 1:, :]
-        sine, cosine = np.sin(angles), np.cos(angles)
-        (sx, sy, sz), (cx, cy, cz) = rows(sine), rows(cosine)
-        ss, cc, sc, cs = sx * sy, cx * cy, sx * cy, cx * sy
-        x, y, z = sc * cz + cs * sz, cs * cz - sc * sz, cc * sz + ss * cz
-        real = cc * cz - ss * sz
+        lead, (rows, cells) = position.shape[:-1], self._shape
+        flat = np.zeros((*lead, rows * cells + 1))
+        flat.T[self._where], flat.T[-1] = position.T, 1.0
+        motion = flat[..., :-1].reshape(*lead, rows, cells)
+        if self._planar:  # each cell turns by the angle of its hinge
+            each, slope = self._curves.lengths(flat)
+            none = flat[..., :0]
+            return Strained(motion, self._lengths.of(each), each, slope, none, none)
+        turn = flat[..., cells:-1]
+        angles = self._half * turn
+        half = np.concatenate((np.sin(angles), np.cos(angles)), axis=-1)
+        pairs = half.take(self._xs, axis=-1) * half.take(self._ys, axis=-1)
+        quaternion = self._quaternion.of(pairs, half)
+        vector, real = quaternion[..., : 3 * cells], quaternion[..., 3 * cells :]
         # Half the angle is arctan(imaginary/real), and goes on continuously beyond half a turn.
-        imaginary = np.sqrt(x * x + y * y + z * z) + 1e-300
+        imaginary = np.sqrt(self._square.of(vector * vector))
+        imaginary += self._tiny
         ratio = np.arctan2(imaginary, real) / imaginary
-        factor = self._twice * ratio
-        for place, vector in zip(rows(motion)[1:], (x, y, z), strict=True):
-            np.multiply(vector, factor, out=place)
-        each, slope = self._curves.lengths(motion)
-        length = summed(each, self._tca, self._tcas)
-        strained = Strained(motion, length, each, slope, sine, cosine, ratio * real)
-        self._last = key, strained
-        return strained
+        factor = (self._twice * ratio).take(self._thrice, axis=-1)
+        np.multiply(vector, factor, out=turn)
+        each, slope = self._curves.lengths(flat)
+        return Strained(motion, self._lengths.of(each), each, slope, half, ratio * real)
 
     def keep(self, qpos: Array, strained: Strained) -> None:
         """What ``at`` has to return for ``qpos``, computed elsewhere."""
@@ -213,21 +250,16 @@ class SmoothBody:
             slope: Derivatives of MuJoCo's tendons at ``qpos``, ``ten_J``, shape (..., nJten).
             qpos: Positions of the model's joints, shape (..., nq).
         """
-        pulls = tension.take(self._tca, axis=-1)[..., None, :] * strained.slope
-        lead = pulls.shape[:-2]
-        load = self.stiffness * (strained.motion - self.rest)
-        flat = (*lead, self._shape[0] * self._shape[1])
-        pulls = summed(pulls.reshape(*lead, -1), self._cells, flat[-1])
-        load += pulls.reshape(load.shape)
-        self._turn_to_hinges(load, strained)
-        owed = load.reshape(flat)[..., self._held]
-        entry, tca, joint = self._entries
-        pulled = tension.take(tca, axis=-1) * slope.take(entry, axis=-1)
-        owed = owed - summed(pulled, joint, len(self._where))
-        joint, tca, more = self._more
-        stiffness = self.stiffness.reshape(flat)[..., self._held]
-        stiffness = stiffness + summed(tension.take(tca, axis=-1) * more, joint, len(self._where))
-        return stiffness, qpos.take(self._qpos, axis=-1) - owed / stiffness
+        flat = (*tension.shape[:-1], -1)
+        load = (self.stiffness * (strained.motion - self.rest)).reshape(flat)
+        load += self._pulls.of(tension.take(self._pulling, axis=-1) * strained.slope.reshape(flat))
+        if not self._planar:
+            self._turn_to_hinges(load, strained)
+        owed = load.take(self._where, axis=-1) - self._entries.of(tension, slope)
+        stiffness = self.stiffness.reshape(flat).take(self._where, axis=-1)
+        stiffness += self._more.of(tension)
+        owed /= stiffness
+        return stiffness, qpos.take(self._qpos, axis=-1) - owed
 
     def support(self, data: mujoco.MjData, strained: Strained, tension: Array) -> None:
         """Sets the springs for tensions at the positions in ``data``.
@@ -241,8 +273,8 @@ class SmoothBody:
 
     def set_springs(self, stiffness: Array, reference: Array) -> None:
         """Writes what ``springs`` computes, shape (j,) each, to the model."""
-        self._model.jnt_stiffness[self._joint] = stiffness
-        self._model.qpos_spring[self._qpos] = reference
+        self._model.jnt_stiffness.put(self._joint, stiffness)
+        self._model.qpos_spring.put(self._qpos, reference)
 
     def places(self, joints: Sequence[str]) -> NDArray[np.int64]:
         """Indices of joints in the flattened arrays of shape (4, cells).
@@ -271,38 +303,35 @@ class SmoothBody:
             tension: Tensions of the TCAs, shape (..., n) [N].
             time: Damping over that stiffness, at least the time step [s].
         """
-        tension = tension.take(self._tca, axis=-1)
-        twist = summed(time * tension * self._twist / strained.each, self._cell, self._shape[1])
-        damping = self.damping.copy()
-        _, bend_x, bend_y, _ = rows(strained.motion)
-        _, across_y, across_x, along = rows(damping)
-        across_y += 0.25 * bend_y**2 * twist
-        across_x += 0.25 * bend_x**2 * twist
-        along += twist
-        lead = damping.shape[:-2]
-        return damping.reshape(*lead, -1)[..., self._held]
+        twist = (tension * time).take(self._tca, axis=-1) * self._twist / strained.each
+        twist, flat = self._twists.of(twist), (*tension.shape[:-1], -1)
+        across = strained.motion.reshape(flat).take(self._across, axis=-1)
+        share = across * across * self._quarter + self._along
+        own = self.damping.reshape(flat).take(self._where, axis=-1)
+        return own + share * twist.take(self._column, axis=-1)
 
     def set_damping(self, damping: Array) -> None:
         """Writes what ``damped`` computes, shape (j,), to the model."""
-        self._model.dof_damping[self._dof] = damping
+        self._model.dof_damping.put(self._dof, damping)
 
     def _turn_to_hinges(self, load: Array, strained: Strained) -> None:
         """Turns the moments on the rotation vectors, rows 1 to 3, to moments about the hinges."""
-        tx, ty, tz = rows(self._order * strained.motion[..., 1:, :])
-        row_x, row_y, row_z = rows(load)[1:]
-        mx, my, mz = row_x.copy(), row_y.copy(), row_z.copy()
+        n = self._shape[1]
+        motion = strained.motion.reshape(load.shape)
+        both = np.concatenate((motion, load), axis=-1)
+        products = self._products.of(both, both)
         # By the transposed derivative of the logarithm, m - t × m/2 + c t × (t × m).
-        square = tx * tx + ty * ty + tz * tz
         cotangent = strained.cotangent
-        c = (1.0 - cotangent) / np.maximum(square, 1e-9)
-        along = c * (tx * mx + ty * my + tz * mz)
-        m0 = cotangent * mx + along * tx - 0.5 * (ty * mz - tz * my)
-        m1 = cotangent * my + along * ty - 0.5 * (tz * mx - tx * mz)
-        m2 = cotangent * mz + along * tz - 0.5 * (tx * my - ty * mx)
+        c = (self._one - cotangent) / np.maximum(products[..., :n], self._small)
+        c *= products[..., n : 2 * n]
+        m = cotangent.take(self._thrice, axis=-1) * load[..., n:]
+        m += c.take(self._thrice, axis=-1) * motion[..., n:]
+        m += products[..., 2 * n :]
         # The axes of the outer hinges as the inner ones have turned them.
-        half = strained.sine[..., 1:, :]
-        sy, sz = rows(2.0 * half * strained.cosine[..., 1:, :])
-        cy, cz = rows(1.0 - 2.0 * half**2)
-        np.add(cy * (cz * m0 - sz * m1), sy * m2, out=row_x)
-        np.add(sz * m0, cz * m1, out=row_y)
-        row_z[...] = m2
+        half = strained.half[..., n : 3 * n]
+        twice = half + half
+        cosine, sine = 1.0 - twice * half, twice * strained.half[..., 4 * n :]
+        turned = self._turned.of(np.concatenate((cosine, sine), axis=-1), m)
+        along, z = cosine[..., :n] * turned[..., :n], m[..., 2 * n :]
+        np.add(along, sine[..., :n] * z, out=load[..., n : 2 * n])
+        load[..., 2 * n : 3 * n], load[..., 3 * n :] = turned[..., n:], z

@@ -51,8 +51,8 @@ class RoutedSpine(Checked):
     def __post_init__(self) -> None:
         Checked.__post_init__(self)
         require_positive(**dict(self.joints))
-        if len({name for name, _ in self.joints}) < len(self.joints):
-            raise ValueError(f"joints of {self.name} must differ, got {self.joints}")
+        if not 0 < len(self.joints) == len({name for name, _ in self.joints}):
+            raise ValueError(f"joints of {self.name} must differ, at least 1, got {self.joints}")
 
 
 @door

@@ -3,17 +3,17 @@
 from collections.abc import Sequence
 from copy import copy
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tca_mj.checks import Array, flags, within
-from tca_mj.model.curves import summed
 from tca_mj.model.smooth import SmoothBody
 from tca_mj.model.spine import RoutedSpine
-from tca_mj.smp import DamageSpec, SpineBank, SpinesState, flag_damage, soft_bending_rate
+from tca_mj.model.sums import Total, rows
+from tca_mj.smp import DamageSpec, SpineBank, SpinesState, damaging, soft_bending_rate
 from tca_mj.tca.arrays import row, stacked
-
 
 class Spines:
     """n spines and the m motions of cells that they stiffen.
@@ -41,8 +41,10 @@ class Spines:
         self.n = len(spines)
         self.names = tuple(spine.name for spine in spines)
         self.damaged = np.zeros(self.n, dtype=bool)
-        self.voltage = np.zeros(self.n)
+        self.voltage = self._off = np.zeros(self.n)
+        self._still = self.damaged
         self.state: SpinesState | None = None
+        self._sprung: Any = (None, None)  # state for which springs were computed last, and these
         if not self.n:
             return
         unknown = [spine.tca for spine in spines if spine.tca not in tcas]
@@ -58,9 +60,19 @@ class Spines:
         heaters = [replace(spine.heater, ambient=ambient) for spine in spines]
         self.bank = SpineBank(specs, heaters, owner)
         self._tca = np.array([tcas.index(spine.tca) for spine in spines])
+        self._first = np.searchsorted(owner, np.arange(self.n))  # joint of each spine
         self._damage = DamageSpec.of(self.bank.smp)
         self._body = body
-        self._own = body.stiffness.copy(), body.rest.copy(), body.damping.copy()
+        stiffness, rest, damping = body.stiffness.copy(), body.rest.copy(), body.damping.copy()
+        # What the cells have without spines: stiffness, moment at angle 0, damping. Where nothing
+        # is stiff, a stiffness of 1 keeps the rest.
+        held = stiffness.ravel() > 0.0
+        held[self._place] = True
+        self._void = np.where(held, 0.0, 1.0).reshape(stiffness.shape)
+        self._own = np.array([stiffness, stiffness * rest + self._void * rest, damping])
+        self._rest = rest
+        place = rows(0, 1, 2, width=rest.size, columns=self._place)
+        self._cells = Total(place, self._own.size)
 
     @classmethod
     def batch(cls, many: Sequence["Spines"], body: SmoothBody) -> "Spines":
@@ -99,12 +111,19 @@ class Spines:
         """Electrical energy put into each heater since the last reset, shape (n,) [J]."""
         return np.zeros(0) if self.state is None else self.state.heat.energy_in
 
+    @property
+    def reference(self) -> Array:
+        """Angle of each joint at which its spines would pull no more, shape (m,) [rad]."""
+        if self.state is not None and self._sprung[0] is not self.state:
+            self._sprung = self.state, self.bank.spring(self.state)
+        return self._sprung[1].reference
+
     def reset(self, motion: Array) -> None:
         """Cold, and fixed in the cells' motions, shape (..., 4, cells) [rad]."""
         self.damaged = np.zeros(self.n, dtype=bool)
         self.voltage = np.zeros(self.n)
         if self.n:
-            memory = self._own[1].reshape(-1)[self._place]
+            memory = self._rest.reshape(-1)[self._place]
             self.state = self.bank.rest(memory, self._angles(motion))
             self._stiffen(self.state)
 
@@ -114,16 +133,16 @@ class Spines:
         Raises:
             ValueError: If one has the wrong shape or is not finite, or there are no spines.
         """
-        volts, blown = within("voltage", voltage), flags("fan", fan)
+        volts, blown, shape = within("voltage", voltage), flags("fan", fan), (self.n,)
         for name, array in (("voltage", volts), ("fan", blown)):
-            if array.shape not in ((), (self.n,)):
-                raise ValueError(f"{name} must have shape ({self.n},), got {array.shape}")
+            if array.shape not in ((), shape):
+                raise ValueError(f"{name} must have shape {shape}, got {array.shape}")
             if not self.n and array.any():
                 raise ValueError(
                     f"{name} must be 0: there is no shape-memory spine, and TCAs are driven by the"
                     f" command, got {array}"
                 )
-        return np.full(self.n, volts), np.full(self.n, blown)
+        return volts + self._off, blown | self._still
 
     def advance(
         self, voltage: Array, fan: NDArray[np.bool_], motion: Array, tension: Array,
@@ -140,33 +159,26 @@ class Spines:
             dt: Length of the step [s].
         """
         assert self.state is not None
-        self.voltage = np.array(voltage)
-        before = self.state.heat.temperature
-        self.state = self.bank.advance(self.state, voltage, fan, self._angles(motion), dt)
-        now = self.state.heat.temperature
-        flags = flag_damage(
-            modulus=self.bank.smp.modulus(now), cooling=now < before,
-            tension=np.maximum(tension.take(self._tca, axis=-1), 0.0),
-            bending_rate=self._rate * tension_rate.take(self._tca, axis=-1), spec=self._damage,
+        self.voltage = voltage
+        state = self.state = self.bank.advance(self.state, voltage, fan, self._angles(motion), dt)
+        modulus = self._stiffen(state)
+        self.damaged = self.damaged | damaging(
+            modulus.take(self._first, axis=-1), tension.take(self._tca, axis=-1),
+            self._rate * tension_rate.take(self._tca, axis=-1), self._damage,
         )  # fmt: skip
-        self.damaged = self.damaged | flags.damaged
-        self._stiffen(self.state)
 
-    def _stiffen(self, state: SpinesState) -> None:
-        modulus, reference = self.bank.spring(state)
-        stiffness, rest, damping = self._own
+    def _stiffen(self, state: SpinesState) -> Array:
+        """Sets the springs of the cells; returns the modulus of the spine at each joint [Pa]."""
+        self._sprung = state, self.bank.spring(state)
+        modulus, reference = self._sprung[1]
         added = self._share * modulus
-        shape = (*added.shape[:-1], *stiffness.shape)
-
-        def cells(values: Array) -> Array:
-            return summed(values, self._place, stiffness.size).reshape(shape)
-
-        total = stiffness + cells(added)
-        moment = stiffness * rest + cells(added * reference)
-        body, own = self._body, np.broadcast_to(rest, shape).copy()
-        body.rest = np.divide(moment, total, out=own, where=total > 0.0)
-        body.stiffness = total
-        body.damping = damping + cells(self._time * added)
+        found = np.concatenate((added, added * reference, self._time * added), axis=-1)
+        found = self._cells.of(found).reshape(*added.shape[:-1], *self._own.shape)
+        found += self._own
+        body = self._body
+        body.stiffness, body.damping = found[..., 0, :, :], found[..., 2, :, :]
+        body.rest = found[..., 1, :, :] / (body.stiffness + self._void)
+        return modulus
 
     def _angles(self, motion: Array) -> Array:
         """Angles of the m joints, shape (..., m) [rad]."""

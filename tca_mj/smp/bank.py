@@ -6,13 +6,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass, fields
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
-from tca_mj.checks import door, instance, shown, within
-from tca_mj.smp.fixing import SpineState, Spring, advance, spring
-from tca_mj.smp.heater import HeaterSpec, HeaterState, heat_spine
+from tca_mj.checks import Array, door, instance, shown, within
+from tca_mj.smp.fixing import SpineState, Spring, spring, with_glass
+from tca_mj.smp.heater import HeaterSpec, HeaterState, heated
 from tca_mj.smp.material import SmpSpec, SpineSpec
 from tca_mj.tca.arrays import column
+from tca_mj.tca.thermal import BareStep
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -65,6 +66,7 @@ class SpineBank:
         self.smp: SmpSpec = specs[0].smp
         names = [field.name for field in fields(HeaterSpec)]
         self.heater = HeaterSpec(**{name: column(heaters, name) for name in names})
+        self._heating: tuple[HeaterSpec, tuple[float, bytes], BareStep] | None = None
 
     @property
     def n(self) -> int:
@@ -96,7 +98,7 @@ class SpineBank:
         return SpinesState(heat, state)
 
     def advance(
-        self, state: SpinesState, voltage: ArrayLike, fan: ArrayLike, angle: ArrayLike, dt: float
+        self, state: SpinesState, voltage: Array, fan: NDArray[np.bool_], angle: Array, dt: float
     ) -> SpinesState:
         """Heats the spines for ``dt``, then lets glass form or melt at the present angles.
 
@@ -108,12 +110,15 @@ class SpineBank:
             dt: Length of the step [s].
 
         Raises:
-            ValueError: If an input is not finite.
+            ValueError: If a spine gets a temperature that is not finite. Inputs are not checked.
         """
-        instance("state", state, SpinesState)
-        heat = heat_spine(self.heater, state.heat, voltage, fan, dt)
-        memory = advance(self.smp, state.memory, angle, heat.temperature[..., self.owner])
-        return SpinesState(heat, memory)
+        heater, of = self.heater, (dt, fan.tobytes())
+        if self._heating is None or self._heating[0] is not heater or self._heating[1] != of:
+            self._heating = heater, of, BareStep.of(heater, heater.losing(fan), dt)
+        power = voltage * voltage / heater.resistance
+        heat = heated(self._heating[2], state.heat, power, dt)
+        glass = self.smp.glass(heat.temperature).take(self.owner, axis=-1)
+        return SpinesState(heat, with_glass(state.memory, angle, glass))
 
     def spring(self, state: SpinesState) -> Spring:
         """Modulus [Pa] and reference [rad] of each joint, shape (..., m)."""

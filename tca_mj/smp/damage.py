@@ -116,11 +116,18 @@ def flag_damage(
     spec = DamageSpec() if spec is None else spec
     instance("spec", spec, DamageSpec)
     modulus, rate = within("modulus", modulus), within("bending_rate", bending_rate)
-    stiff = modulus > spec.soft_modulus
+    tension = within("tension", tension)
+    taut, stiff = tension > spec.slack, modulus > spec.soft_modulus
     hardening = stiff & (modulus < spec.rigid_modulus) & flags("cooling", cooling)
-    taut = within("tension", tension) > spec.slack
     return Damage(
-        damaged=stiff & taut & (rate > spec.steady_rate),
+        damaged=damaging(modulus, tension, rate, spec),
         inaccurate=hardening & taut & (rate < -spec.steady_rate),
         hardening=hardening & np.ones_like(taut),
     )
+
+
+def damaging(modulus: Array, tension: Array, bending_rate: Array, spec: DamageSpec) -> Flags:
+    """Where a TCA is damaged; as ``flag_damage``, but nothing is checked."""
+    contracting = (tension > spec.slack) & (bending_rate > spec.steady_rate)
+    harmed: Flags = contracting & (modulus > spec.soft_modulus)
+    return harmed

@@ -94,11 +94,15 @@ def advance(
     """
     instance("smp", smp, SmpSpec)
     instance("state", state, SpineState)
-    angle = within("angle", angle)
     glass = smp.glass(temperature) + np.zeros_like(state.glass)
-    grown = np.maximum(glass - state.glass, 0.0)
+    return with_glass(state, within("angle", angle), glass)
+
+
+def with_glass(state: SpineState, angle: Array, glass: Array) -> SpineState:
+    """``advance`` to a modulus of the glass, which is not below 0. Nothing is checked."""
     # Share of new glass in all of it; without any glass there is nothing to move.
-    share = np.divide(grown, glass, out=np.zeros_like(glass), where=glass > 0.0)
+    share = np.maximum(glass - state.glass, 0.0)
+    share /= np.maximum(glass, 5e-324)
     return SpineState(state.memory, state.frozen + share * (angle - state.frozen), glass)
 
 
@@ -111,7 +115,7 @@ def spring(smp: SmpSpec, state: SpineState) -> Spring:
     """
     instance("smp", smp, SmpSpec)
     instance("state", state, SpineState)
-    modulus = smp.rubbery + state.glass
+    modulus = state.glass + smp.rubbery
     share = state.glass / modulus
     return Spring(modulus, state.memory + share * (state.frozen - state.memory))
 

@@ -34,7 +34,7 @@ from tca_mj.checks import (
 from tca_mj.smp.convection import Slab, Speed, moving_air, radiation, still_air
 from tca_mj.smp.material import SpineSpec
 from tca_mj.tca import HeatSpec, power_from_voltage
-from tca_mj.tca.thermal import bare_step
+from tca_mj.tca.thermal import BareStep
 
 HOLD_VOLTAGE = 9.5  # Sun, Section 6.1.3 [V]
 COOL_TO = 80.0  # temperature at which both cooling times end, Sun, Section 6.1.3 [°C]
@@ -181,16 +181,19 @@ def heat_spine(
     """
     instance("spec", spec, HeaterSpec)
     instance("state", state, HeaterState)
-    power, loss = spec.power(voltage), spec.losing(fan)
     number("dt", dt, at_least=0.0, unit="s")
-    temperature, lost = bare_step(
-        state.temperature, power, spec.capacity, loss, spec.ambient, dt
-    )
-    if np.shape(temperature) != np.shape(state.temperature):
+    later = heated(BareStep.of(spec, spec.losing(fan), dt), state, spec.power(voltage), dt)
+    if np.shape(later.temperature) != np.shape(state.temperature):
         raise ValueError(
             f"voltage and fan must fit the state's shape {np.shape(state.temperature)},"
             f" got {np.shape(voltage)} and {np.shape(fan)}"
         )
+    return later
+
+
+def heated(step: BareStep, state: HeaterState, power: Array, dt: float) -> HeaterState:
+    """``heat_spine`` for powers [W]. Nothing is checked."""
+    temperature, lost = step.advance(state.temperature, power)
     return HeaterState(temperature, state.energy_in + power * dt, state.energy_lost + lost)
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from functools import partial
+from functools import cached_property, partial
 from typing import Annotated
 
 import numpy as np
@@ -18,7 +18,7 @@ from tca_mj.hints import Length, Modulus, Section, modulus
 SOFT_MODULUS = 50e6
 
 
-@dataclass(frozen=True, kw_only=True, slots=True)
+@dataclass(frozen=True, kw_only=True)
 class SmpSpec(Checked):
     """A shape-memory epoxy: Epon 828 with 6 wt% diethylaminopropylamine (Sun, Section 6.1.1).
 
@@ -58,16 +58,21 @@ class SmpSpec(Checked):
         half = math.sqrt(self.rubbery / self.glassy)  # what is left at the middle
         number("rigid_share", self.rigid_share, above=half, below=1.0)
 
-    @property
+    @cached_property
     def middle(self) -> float:
         """Temperature at which the modulus is the geometric mean of its limits [°C]."""
         return 0.5 * (self.rigid_below + self.soft_above)
 
-    @property
+    @cached_property
     def width(self) -> float:
         """Scale w of the sigmoid 1/(1 + exp((T - middle)/w)) [K]."""
         lost = math.log(self.rigid_share) / math.log(self.rubbery / self.glassy)
         return (self.middle - self.rigid_below) / math.log((1.0 - lost) / lost)
+
+    @cached_property
+    def _height(self) -> float:
+        """Of the sigmoid, ln(glassy/rubbery)."""
+        return math.log(self.glassy / self.rubbery)
 
     def modulus(self, temperature: ArrayLike) -> Array:
         """Young's modulus E(T), any shape [Pa].
@@ -83,7 +88,7 @@ class SmpSpec(Checked):
         Raises:
             ValueError: If a temperature is not finite.
         """
-        return self.rubbery * np.expm1(self._decades(temperature)[0])
+        return np.expm1(self._decades(temperature)[0]) * self.rubbery
 
     def slope(self, temperature: ArrayLike) -> Array:
         """dE/dT, never above 0 [Pa/K].
@@ -97,8 +102,8 @@ class SmpSpec(Checked):
     def _decades(self, temperature: ArrayLike) -> tuple[Array, Array]:
         """ln(E/rubbery) and the sigmoid, 1 when cold and 0 when hot."""
         temperature = within("temperature", temperature)
-        share = expit((self.middle - temperature) / self.width)
-        return math.log(self.glassy / self.rubbery) * share, share
+        share = expit((temperature - self.middle) / -self.width)
+        return share * self._height, share
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)

@@ -1,6 +1,6 @@
 """Arrays of the numbers of n objects, and dataclasses of arrays, stacked and taken apart."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import fields, is_dataclass
 from functools import cache
 from typing import Any, TypeVar
@@ -26,16 +26,28 @@ def column(objects: Iterable[Any], name: str) -> Array:
 
 
 def stacked(values: Sequence[Value]) -> Value:
-    """Dataclasses of arrays as one, with an axis for them before all others.
+    """Dataclasses or named tuples of arrays as one, with an axis for them before all others.
 
-    Fields that are dataclasses themselves, or tuples of them, are stacked alike.
+    Fields that are such values themselves, or tuples of them, are stacked alike.
     """
-    return _mapped(lambda *each: np.stack(each), *values)
+    every: Any = values
+    kind: Any = type(every[0])
+    if kind is tuple:
+        return tuple(map(stacked, zip(*every, strict=True)))  # type: ignore[return-value]
+    if not _names(kind):
+        return np.array(every)  # type: ignore[return-value]
+    return kind(
+        **{name: stacked([getattr(each, name) for each in every]) for name in _names(kind)}
+    )
 
 
 def row(values: Value, i: int) -> Value:
     """The ``i``-th of what ``stacked`` has made one."""
-    return _mapped(lambda each: each[i], values)
+    every: Any = values
+    kind: Any = type(every)
+    if not _names(kind):
+        return every[i]
+    return kind(*[row(getattr(every, name), i) for name in _names(kind)])
 
 
 def unstacked(values: Value) -> list[Value]:
@@ -43,27 +55,15 @@ def unstacked(values: Value) -> list[Value]:
     every: Any = values
     if isinstance(every, np.ndarray):
         return list(every)
-    if isinstance(every, tuple):
+    if type(every) is tuple:
         return list(zip(*map(unstacked, every), strict=True))  # type: ignore[arg-type]
     kind: Any = type(every)
     parts = zip(*[unstacked(getattr(every, name)) for name in _names(kind)], strict=True)
     return [kind(*each) for each in parts]
 
 
-def _mapped(function: Callable[..., Any], *values: Any) -> Any:
-    """``function`` of the arrays that stand at the same place in each of the values."""
-    first = values[0]
-    if isinstance(first, tuple):
-        return tuple(_mapped(function, *each) for each in zip(*values, strict=True))
-    if not is_dataclass(first):
-        return function(*values)
-    kind: Any = type(first)
-    return kind(
-        **{name: _mapped(function, *[getattr(each, name) for each in values])
-           for name in _names(kind)}
-    )  # fmt: skip
-
-
 @cache
 def _names(kind: Any) -> tuple[str, ...]:
-    return tuple(field.name for field in fields(kind))
+    """Names of the fields of a dataclass or a named tuple; none of anything else."""
+    found: tuple[str, ...] = getattr(kind, "_fields", ())
+    return tuple(field.name for field in fields(kind)) if is_dataclass(kind) else found

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tca_mj.checks import Array, door, floats, instance, shown, within
+from tca_mj.checks import Array, door, every, floats, instance, shown, some, within
 from tca_mj.tca.arrays import column, frozen
 from tca_mj.tca.laws.law import LawChoice, TensionLaw
 from tca_mj.tca.laws.rod import CoilRods
@@ -73,8 +73,7 @@ class TcaState:
     energy_lost: Array
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Pull:
+class Pull(NamedTuple):
     """Affine tension law of n TCAs about a length, each array of shape (..., n).
 
     The law F(l) = tension + stiffness (l - length) is not clipped: it is negative where the coil
@@ -146,10 +145,12 @@ class TcaBank:
         if not callable(law) and law not in _LAWS:
             raise ValueError(f"law must be 'rod' or 'surface', got {law!r}")
         self.law = law
-        self._coils = (law if callable(law) else _LAWS[law])(self.specs)
+        self._law = law if callable(law) else _LAWS[law]
+        self._coils = self._law(self.specs)
         for name in ("shortest", "longest", "tension"):
             if not hasattr(self._coils, name):
                 raise ValueError(f"law must make a TensionLaw with {name}, got {shown(law)}")
+        self._several: dict[int, tuple[TensionLaw, list[Any]]] = {}
         self._wire = WireTable.of(self.specs)
         self.heat = heat_of(self.specs)
         self.supply = Supply()
@@ -209,7 +210,7 @@ class TcaBank:
                 f"temperature must have shape (..., {self.n}), got {temperature.shape}"
             )
         ambient = self.heat.ambient
-        if not (temperature >= ambient).all():
+        if not every(temperature >= ambient):
             raise ValueError(
                 f"temperature must be at least that of the surroundings, {ambient} °C,"
                 f" got {temperature}"
@@ -235,29 +236,49 @@ class TcaBank:
                 heat leaves no modulus.
             CoilSolveError: If the shape of a coil is not found.
         """
-        length = self._checked(state, "length", length)
-        tension, stiffness = self._coils.tension(length, state.temperature)
-        return Pull(tension, stiffness, length)
+        return self.pulls((state,), length)[0]
+
+    def pulls(self, states: Sequence[TcaState], length: ArrayLike) -> list[Pull]:
+        """``pull`` of several states at one length, all at once."""
+        k = len(states)
+        if k not in self._several:  # as TCAs side by side
+            parts = [np.s_[..., i * self.n : (i + 1) * self.n] for i in range(k)]
+            self._several[k] = self._law(k * self.specs) if k > 1 else self._coils, parts
+        length = self._checked(states[0], "length", length)
+        temperature = np.concatenate([state.temperature for state in states], axis=-1)
+        lengths = np.concatenate(k * [length], axis=-1)
+        law, parts = self._several[k]
+        tension, stiffness = law.tension(lengths, temperature)
+        return [Pull(tension[part], stiffness[part], length) for part in parts]
 
     def advance(
         self, state: TcaState, command: ArrayLike, length: ArrayLike, dt: float
     ) -> tuple[TcaState, Pull]:
-        """Heats by ``dt`` at constant power, exactly, then evaluates the pull.
+        """Heats by ``dt``, then evaluates the pull; arguments and errors as ``warmed``, ``pull``.
+
+        Returns:
+            The state at the end of the step and the pull at its temperature.
+        """
+        state = self.warmed(state, command, length, dt)
+        return state, self.pull(state, length)
+
+    def warmed(
+        self, state: TcaState, command: ArrayLike, length: ArrayLike, dt: float
+    ) -> TcaState:
+        """Heats by ``dt`` at constant power, exactly.
 
         Args:
             state: State at the start, shape (..., n).
             command: What ``supply`` makes power of, same shape; a power, not negative [W].
-            length: Length of every TCA, same shape; the pull is about it [m].
+            length: Length of every TCA, same shape [m].
             dt: Length of the step, not negative [s].
 
         Returns:
-            The state at the end of the step and the pull at its temperature.
+            The state at the end of the step.
 
         Raises:
-            ValueError: If shapes differ, a power or ``dt`` is negative or not finite, or as
-                ``pull``.
+            ValueError: If shapes differ, or a power or ``dt`` is negative or not finite.
             TcaMelted: If a TCA would be hotter than its ``melting_temperature``.
-            CoilSolveError: If the shape of a coil is not found.
         """
         power = self.supply.power(
             self._checked(state, self.supply.quantity, command), state.temperature, state.body,
@@ -270,12 +291,11 @@ class TcaBank:
             step = self._heating = HeatStep.of(self.heat, dt)
         temperature, body, lost = step.advance(state.temperature, state.body, power)
         molten = temperature > self.melting_temperature
-        if molten.any():
+        if some(molten):
             worst = tuple(int(i) for i in np.argwhere(molten)[0])
             melting = float(self.melting_temperature[worst[-1]])
             raise TcaMelted(worst[-1], float(temperature[worst]), melting)
-        state = TcaState(temperature, body, state.energy_in + power * dt, state.energy_lost + lost)
-        return state, self.pull(state, length)
+        return TcaState(temperature, body, state.energy_in + power * dt, state.energy_lost + lost)
 
     def resistance(self, state: TcaState, length: ArrayLike, *, strict: bool = True) -> Array:
         """Resistance at given lengths, shape (..., n) [ohm]; as ``sensing.wire.resistance``."""

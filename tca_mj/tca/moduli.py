@@ -167,7 +167,9 @@ def softened(
     unloaded = within(_LEFT, 1.0 - fall * mu0, above=0.0)
     # Zero for a pushed or a cold coil, which leaves F = f (1 - k mu0).
     load = np.maximum(stiff, 0.0) * np.maximum(fall, 0.0) * torsion_per_tension
-    linear = 1.0 + load * mu1
-    root = np.sqrt(linear * linear + 4.0 * (load * mu2) * torsion_per_tension * stiff * unloaded)
-    left = 2.0 * unloaded / (linear + root)
+    linear = load * mu1 + 1.0
+    twice = load + load  # twice and again: 4 load
+    root = twice * mu2 * torsion_per_tension * (stiff + stiff) * unloaded
+    root = np.sqrt(linear * linear + root)
+    left = (unloaded + unloaded) / (linear + root)
     return stiff * left, left / root

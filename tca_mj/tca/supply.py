@@ -65,7 +65,8 @@ class Thermostat(Checked):
         goal = np.minimum(target, self.max_temperature)
         heat, error = self.heat, goal - temperature
         steady = heat.loss * (goal - heat.ambient) + heat.conductance * (goal - body)
-        return np.clip(steady + heat.capacity * error / self.response, 0.0, self.max_power)
+        power = steady + heat.capacity * error / self.response
+        return np.minimum(np.maximum(power, 0.0), self.max_power)
 
 
 @dataclass(frozen=True, kw_only=True, slots=True, eq=False)
@@ -116,7 +117,7 @@ class Supply(Checked):
         """
         least = 0.0 if self.quantity == "power" else -math.inf
         unit = UNITS[self.quantity]
-        return np.array(within(self.quantity, command, at_least=least, unit=unit, shape=(n,)))
+        return within(self.quantity, command, at_least=least, unit=unit, shape=(n,)).copy()
 
     def power(
         self, command: Array, temperature: Array, body: Array, resistance: Callable[[], Array]
@@ -133,12 +134,12 @@ class Supply(Checked):
             ValueError: As ``resistance`` does.
         """
         quantity, limits = self.quantity, (self.max_voltage, self.max_current)
-        limited = any(np.isfinite(limit).any() for limit in limits)
+        limited = any(not isinstance(limit, float) or limit < math.inf for limit in limits)
         power = command
         if quantity == "temperature":
             assert self.thermostat is not None
             held = self.thermostat._power(temperature, command, body)
-            power = np.where(command > self.thermostat.heat.ambient, held, 0.0)
+            power = held * (command > self.thermostat.heat.ambient)
         if limited or quantity in ("voltage", "current"):
             ohms = resistance()
             if quantity == "voltage":
@@ -147,7 +148,8 @@ class Supply(Checked):
                 power = command**2 * ohms
             power = np.minimum(power, np.square(self.max_voltage) / ohms)
             power = np.minimum(power, np.square(self.max_current) * ohms)
-        return np.minimum(power, self.max_power)
+        most = self.max_power
+        return power if isinstance(most, float) and most == math.inf else np.minimum(power, most)
 
     def like(self, other: Supply) -> bool:
         """Whether another supply does the same."""

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import partial
-from typing import Annotated, NamedTuple, Self
+from typing import Annotated, Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -137,8 +137,7 @@ class HeatStep(NamedTuple):
         heat: Thermal constants.
         dt: Length of the step [s].
         own, body_own: Change of an excess over the surroundings by itself, over that excess [1].
-        mixed: What the excess of one adds to the other, over both and over the capacity of the
-            one that it comes from [K/J].
+        given, taken: What the excess of TCA and body adds to that of the other, over it [1].
         warmed, body_warmed: Rise of TCA and body per power [K/W].
         lost, body_lost: Heat given to the air per excess of TCA and body at the start [J/K].
         passed: Heat given to the air per power [J/W].
@@ -148,7 +147,8 @@ class HeatStep(NamedTuple):
     dt: float
     own: Array
     body_own: Array
-    mixed: Array
+    given: Array
+    taken: Array
     warmed: Array
     body_warmed: Array
     lost: Array
@@ -201,8 +201,8 @@ class HeatStep(NamedTuple):
         held, swapped, stayed = matrix(once)
         rose, crossed, _ = matrix(twofold)
         return cls(
-            heat=heat, dt=dt, own=own, body_own=body_own, mixed=mixed,
-            warmed=held / capacity, body_warmed=swapped,
+            heat=heat, dt=dt, own=own, body_own=body_own,
+            given=capacity * mixed, taken=body * mixed, warmed=held / capacity, body_warmed=swapped,
             lost=loss * held + out * capacity * swapped,
             body_lost=loss * body * swapped + out * stayed,
             passed=loss * rose / capacity + out * crossed,
@@ -214,12 +214,11 @@ class HeatStep(NamedTuple):
         The heat is the integral of the balances and not the difference of energy in and energy
         stored, so that the sum of the three remains a check. Nothing is checked here.
         """
-        heat = self.heat
-        ambient = heat.ambient
+        ambient = self.heat.ambient
         x, y = temperature - ambient, body - ambient
         # Changes, so that what is at rest stays there to the bit.
-        hotter = self.own * x + heat.body_capacity * self.mixed * y + self.warmed * power
-        warmer = self.body_own * y + heat.capacity * self.mixed * x + self.body_warmed * power
+        hotter = self.own * x + self.taken * y + self.warmed * power
+        warmer = self.body_own * y + self.given * x + self.body_warmed * power
         lost = self.lost * x + self.body_lost * y + self.passed * power
         return temperature + hotter, body + warmer, lost
 
@@ -284,17 +283,33 @@ def heat_lost(temperature: ArrayLike, power: ArrayLike, heat: HeatSpec, dt: floa
     return _bare(temperature, power, heat, dt)[1]
 
 
-def bare_step(
-    temperature: Array, power: Array, capacity: float | Array, loss: float | Array,
-    ambient: float | Array, dt: float,
-) -> tuple[Array, Array]:  # fmt: skip
-    """Both of these at once: temperature at the end [°C] and heat lost [J]. Nothing is checked."""
-    # The start's excess dies out, the power's builds up: T - T_amb = x e + (P/λ) (1 - e).
-    fading = np.expm1(-dt * loss / capacity)
-    settled = ambient + power / loss
-    of_start = capacity * (temperature - ambient) * -fading
-    lost = of_start + power * (dt - capacity / loss * -fading)
-    return temperature - (settled - temperature) * fading, lost
+class BareStep(NamedTuple):
+    """What a step does to what is bare. Nothing is checked.
+
+    Attributes:
+        capacity, loss, ambient: As in ``HeatSpec``.
+        built: Share of the way to the temperature that the power holds, 1 - exp(-λ dt/C) [1].
+        passed: Heat given to the air per power [J/W].
+    """
+
+    capacity: float | Array
+    loss: float | Array
+    ambient: float | Array
+    built: Array
+    passed: Array
+
+    @classmethod
+    def of(cls, heat: Any, loss: float | Array, dt: float) -> Self:
+        """The step of length ``dt`` [s] with capacity and surroundings of ``heat``."""
+        built = -np.expm1(-dt * loss / heat.capacity)
+        return cls(heat.capacity, loss, heat.ambient, built, dt - heat.capacity / loss * built)
+
+    def advance(self, temperature: Array, power: Array) -> tuple[Array, Array]:
+        """Temperature at the end [°C] and heat lost [J]."""
+        # The start's excess dies out, the power's builds up: T - T_amb = x e + (P/λ) (1 - e).
+        lost = self.capacity * (temperature - self.ambient) * self.built + power * self.passed
+        settled = self.ambient + power / self.loss
+        return temperature + (settled - temperature) * self.built, lost
 
 
 def require_bare(heat: HeatSpec) -> None:
@@ -332,4 +347,4 @@ def _bare(
     require_bare(heat)
     power = within("power", power, at_least=0.0, unit="W")
     temperature = within("temperature", temperature)
-    return bare_step(temperature, power, heat.capacity, heat.loss, heat.ambient, dt)
+    return BareStep.of(heat, heat.loss, dt).advance(temperature, power)

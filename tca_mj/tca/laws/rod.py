@@ -40,7 +40,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tca_mj.checks import Array, door, floats, within
+from tca_mj.checks import Array, door, floats, some, within
 from tca_mj.tca.arrays import column, frozen
 from tca_mj.tca.laws.roots import TOLERANCE, bracketed
 from tca_mj.tca.moduli import FibreTable, radial_growth, softened, softening, untwist
@@ -199,7 +199,7 @@ class CoilRods:
         per_tension = self.torsion_per_tension(temperature)
         tension, share = softened(self._fibres, temperature, stiff, per_tension)
         slope = share * slope
-        if not (length < self._minimum).any():
+        if not some(length < self._minimum):
             return tension, slope
         contact, contact_slope = self._contact(length)
         return tension - contact, slope + contact_slope
@@ -236,6 +236,8 @@ class CoilRods:
 
     def torsion_per_tension(self, temperature: Array) -> Array:
         """Torsion τ = F r_t cos α*/(G J) of the fibre per tension, of its section [rad/(m N)]."""
+        if not self._any_hot:
+            return self._torsion_per_tension
         growth = self._growth(temperature)
         return self._torsion_per_tension / (growth * growth * growth)
 

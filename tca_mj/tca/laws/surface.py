@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tca_mj.checks import Array, door, floats
+from tca_mj.checks import Array, door, every, floats
 from tca_mj.tca.arrays import column
 from tca_mj.tca.laws.rod import CoilRods
 from tca_mj.tca.laws.table import calibrate, evaluate
@@ -51,9 +51,13 @@ class CoilSurfaces:
         p, q = np.array([surface.cells for surface in self.surfaces]).T
         fibre_length = column(specs, "fibre_length")
         ends = np.array([(surface.shortest, surface.longest) for surface in self.surfaces]).T
-        self._start = fibre_length * ends[0]
         self._per_metre = p / (fibre_length * (ends[1] - ends[0]))
-        self._per_kelvin = q / (self.hottest - self.coldest)
+        # Of lengths and, behind them, temperatures: domain, and first cell and cells per unit.
+        self._least = np.concatenate((self.shortest, self.coldest))
+        self._most = np.concatenate((self.longest, self.hottest))
+        self._start = np.concatenate((fibre_length * ends[0], self.coldest))
+        per_kelvin = q / (self.hottest - self.coldest)
+        self._per_unit = np.concatenate((self._per_metre, per_kelvin))
         # All tables side by side, one column per cell.
         offset, columns, size = {}, [], 0
         for surface in {id(surface): surface for surface in self.surfaces}.values():
@@ -68,19 +72,21 @@ class CoilSurfaces:
         """Tension of the coils and its slope over length; all as ``CoilRods.tension``."""
         length, temperature = floats("length", length), floats("temperature", temperature)
         if length.shape == temperature.shape and length.shape[-1:] == (self.n,):
-            inside = (length >= self.shortest) & (length <= self.longest)
-            inside &= (temperature >= self.coldest) & (temperature <= self.hottest)
-            if inside.all():
-                return self._read(length, temperature)
+            at = np.concatenate((length, temperature), axis=-1)
+            if every(at >= self._least) and every(at <= self._most):
+                return self._read(at, length, temperature)
         exact = self.rods.tension(length, temperature)  # raises if anything is wrong
         inside = (temperature >= self.coldest) & (temperature <= self.hottest)
-        read = self._read(length, np.clip(temperature, self.coldest, self.hottest))
+        near = np.clip(temperature, self.coldest, self.hottest)
+        read = self._read(np.concatenate((length, near), axis=-1), length, near)
         return np.where(inside, read[0], exact[0]), np.where(inside, read[1], exact[1])
 
-    def _read(self, length: Array, temperature: Array) -> tuple[Array, Array]:
-        x = (length - self._start) * self._per_metre
-        t = (temperature - self.coldest) * self._per_kelvin
-        i, j = np.floor(x), np.floor(t)
-        cell = (i * self._row + (j + self._offset)).astype(np.intp)
-        stiff, slope = evaluate(self._table.take(cell, axis=1), x - i, t - j)
+    def _read(self, at: Array, length: Array, temperature: Array) -> tuple[Array, Array]:
+        inside = (at - self._start) * self._per_unit
+        cell = np.floor(inside)
+        inside -= cell
+        row, place = cell[..., : self.n], cell[..., self.n :]
+        found = self._table.take((row * self._row + (place + self._offset)).astype(np.intp), axis=1)
+        u, v = inside[..., : self.n], inside[..., self.n :]
+        stiff, slope = evaluate(found, u, np.array((v, v, v, v)))
         return self.rods.finished(length, temperature, stiff, slope * self._per_metre)

@@ -225,14 +225,15 @@ def _measured(coil: TcaSpec, rods: CoilRods, surface: Surface) -> SurfaceBound:
 
 
 def evaluate(cell: Array, u: Array, v: Array) -> tuple[Array, Array]:
-    """Value and derivative by u of a cell's polynomial; ``cell``, (12, ...), is overwritten."""
-    cubic = cell[8:]
-    cubic *= v
+    """Value and derivative by u of polynomials of u and v, whose coefficients are (12, ...).
+
+    NumPy is faster with v of the shape (4, ...) of what it multiplies.
+    """
+    cubic = cell[8:] * v
     cubic += cell[4:8]
     cubic *= v
     cubic += cell[:4]
-    c0, c1, c2, c3 = cubic
-    u_c3 = u * c3  # Horner's scheme for both at once
-    b2 = c2 + u_c3
-    b1 = c1 + u * b2
-    return c0 + u * b1, b1 + u * (b2 + u_c3)
+    u_c3 = u * cubic[3]  # Horner's scheme for both at once
+    b2 = cubic[2] + u_c3
+    b1 = cubic[1] + u * b2
+    return cubic[0] + u * b1, b1 + u * (b2 + u_c3)
