@@ -23,9 +23,8 @@ from tca_mj.rod.lie import matrix_quaternion, quaternion_exp, quaternion_matrix,
 from tca_mj.tca.catalogue import CATALOGUE
 from tca_mj.tca.spec import FibreSpec, TcaSpec
 
-# Points of Gauss's quadrature on [0, 1]: two for the frames, four for the length.
-_GAUSS_2 = 0.5 + np.array([-0.5, 0.5]) / math.sqrt(3.0)
-_RULE = GaussRule.of(4)
+# Gauss's points on [0, 1]: two for the frames, four for the length.
+_FRAMES, _RULE = GaussRule.of(2), GaussRule.of(4)
 _NEWTON_STEPS = 50
 
 
@@ -152,7 +151,7 @@ class Centreline(Checked):
         rotation = np.stack([normal, np.cross(tangent, normal), tangent], axis=1)
         # R' = hat(w) R by Magnus's expansion, fourth order. The steps multiply from the left:
         # conjugates turn that into a running product from the right.
-        w = turn(t[:-1, None] + step[:, None] * _GAUSS_2)
+        w = turn(t[:-1, None] + step[:, None] * _FRAMES.node)
         angle = 0.5 * step[:, None] * (w[:, 0] + w[:, 1])
         angle -= math.sqrt(3.0) / 12.0 * np.square(step)[:, None] * np.cross(w[:, 0], w[:, 1])
         turns = np.vstack([matrix_quaternion(rotation), np.zeros((len(step), 4))])
