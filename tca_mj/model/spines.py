@@ -12,8 +12,10 @@ from tca_mj.checks import Array, flags, within
 from tca_mj.model.smooth import SmoothBody
 from tca_mj.model.spine import RoutedSpine
 from tca_mj.model.sums import Total, rows
-from tca_mj.smp import DamageSpec, SpineBank, SpinesState, damaging, soft_bending_rate
+from tca_mj.smp import DamageSpec, SpineBank, SpinesState, soft_bending_rate
+from tca_mj.smp.damage import damaging
 from tca_mj.tca.arrays import row, stacked
+
 
 class Spines:
     """n spines and the m motions of cells that they stiffen.
