@@ -29,10 +29,13 @@ class Option:
         high: Upper bound [``unit``].
         choices: What can be chosen, if it is no number.
         draw: Its value if none is given, from the episode's generator and the rows above; it is
-            called in any case, so that a value that is given shifts no other draw. None for evenly
-            between the bounds.
+            called in any case, so that a value that is given shifts no other draw. None for one of
+            the choices, or evenly between the bounds.
         drawn: How that is done, in a few words.
         check: Raises a ``ValueError`` for a value that bounds do not exclude.
+
+    Raises:
+        ValueError: If there is nothing to draw from.
     """
 
     name: str
@@ -46,10 +49,20 @@ class Option:
     choices: tuple[str, ...] = ()
     check: Callable[[Any], None] | None = None
 
+    def __post_init__(self) -> None:
+        bounded = self.choices or np.isfinite([self.low, self.high]).all()
+        if self.draw is None and not bounded:
+            raise ValueError(
+                f"draw of {self.name} must be given where a bound is infinite, got None between"
+                f" {self.low} and {self.high}"
+            )
+
     def value(self, random: np.random.Generator, setup: Setup) -> Any:
         """Its value if none is given, drawn after those in ``setup``."""
         if self.draw is not None:
             return self.draw(random, setup)
+        if self.choices:
+            return str(random.choice(self.choices))
         return random.uniform(self.low, self.high, self.shape or None)
 
     def checked(self, value: Any) -> Any:

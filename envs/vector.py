@@ -16,12 +16,14 @@ from typing import Any
 
 import gymnasium as gym
 import numpy as np
+from gymnasium.envs.registration import parse_env_id
 from gymnasium.error import ClosedEnvironmentError, ResetNeeded
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
 from tca_mj.batch import SimulationBatch
+from tca_mj.checks import text, whole
 from tca_mj.envs.table import commands
 from tca_mj.envs.task import Observation, Outcome, SimulatedTask, together
 
@@ -339,7 +341,18 @@ def register_task(
         task: Its class.
         max_episode_steps: Number of control steps after which an episode is truncated.
         **arguments: Arguments of the class that make it this task; a caller's own come on top.
+
+    Raises:
+        ValueError: If the id is none, or the class no task.
     """
+    if not (isinstance(task, type) and issubclass(task, SimulatedTask)):
+        raise ValueError(f"task must be a class of a SimulatedTask, got {task!r}")
+    try:
+        parse_env_id(text("id", id))
+    except gym.error.Error as error:
+        raise ValueError(f"id must be Place/Name-v0, got {id!r}: {error}") from error
+    if max_episode_steps is not None:
+        whole("max_episode_steps", max_episode_steps, at_least=1)
     entry: Callable[..., Any] = task
     gym.register(
         id, entry_point=entry, vector_entry_point=partial(TaskVector, task),

@@ -25,6 +25,7 @@ from tca_mj.checks import (
     NotNegative,
     Numbers,
     Positive,
+    Share,
     Triple,
     door,
     number,
@@ -82,7 +83,8 @@ class Helix(Checked):
         angle = self.phase + rate * s
         return self.radius * rate * np.stack([-np.sin(angle), np.cos(angle)], axis=-1)
 
-    def between(self, start: float, end: float) -> Helix:
+    @door
+    def between(self, start: Share, end: Share) -> Helix:
         """The part of it from ``start`` to ``end`` in [0, 1], for a body of that part's length."""
         phase = self.phase + 2.0 * np.pi * self.turns * start
         return replace(self, turns=self.turns * (end - start), phase=phase)

@@ -21,7 +21,16 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tca_mj.actuation import Group, MixedBank, Signal, muscle_group
-from tca_mj.checks import NotNegative, Numbers, Positive, door, every, number, require_one_of
+from tca_mj.checks import (
+    NotNegative,
+    Numbers,
+    Positive,
+    door,
+    every,
+    number,
+    require_one_of,
+    text,
+)
 from tca_mj.couple import Inputs, Writes, advance, measure, write
 from tca_mj.model.build import stage
 from tca_mj.model.mujoco_warnings import count_warnings
@@ -344,7 +353,7 @@ class Simulation:
         Raises:
             ValueError: If there is no such chain.
         """
-        unknown = [name for name in chains if name not in self.chains]
+        unknown = [name for name in chains if text("chains", name) not in self.chains]
         if unknown or not chains:
             raise ValueError(f"chains must be some of {list(self.chains)}, got {unknown or chains}")
         bodies = [

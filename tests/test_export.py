@@ -83,7 +83,7 @@ def test_what_is_exported_stays_as_it_was():
 
 
 def test_colder_than_the_surroundings_is_refused():
-    with pytest.raises(ValueError, match="temperature must be finite and at least"):
+    with pytest.raises(ValueError, match="temperature must be at least that of the surroundings"):
         export(bending_module(), temperatures=10.0)
 
 

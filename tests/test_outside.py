@@ -91,3 +91,42 @@ def test_the_machinery_names_no_task_and_no_robot():
         code = re.sub(r'""".*?"""|"""\\\n.*?"""', "", path.read_text(), flags=re.DOTALL)
         found = [line for line in code.splitlines() if name.search(line)]
         assert (path.name, found) == (path.name, [])
+
+
+def test_what_cannot_be_registered_is_refused():
+    from tca_mj.envs import SimulatedTask, register_task
+
+    class Bare(SimulatedTask):
+        def observe(self):
+            return {}
+
+        def judge(self, drive, harmed):
+            return None
+
+    with pytest.raises(ValueError, match="task must be a class of a SimulatedTask, got 'Bare'"):
+        register_task("Example/Bare-v0", "Bare")
+    with pytest.raises(ValueError, match="id must be Place/Name-v0, got 'Example/Bare v0'"):
+        register_task("Example/Bare v0", Bare)
+    with pytest.raises(ValueError, match="max_episode_steps must be at least 1, got 0"):
+        register_task("Example/Bare-v0", Bare, max_episode_steps=0)
+    with pytest.raises(ValueError, match="scene must be what builds the robot of Bare, got None"):
+        Bare()
+
+
+def test_options_are_drawn_evenly_by_default():
+    from tca_mj.envs import Option, Options
+
+    rows = [
+        Option(name="angle", about="an angle", low=1.0, high=3.0),
+        Option(name="place", about="a place", low=0.0, high=0.1, shape=(2,)),
+        Option(name="side", about="a side", choices=("left", "right")),
+    ]
+    random = np.random.default_rng(0)
+    drawn = [Options(rows).setup(random, {}) for _ in range(400)]
+    angles = np.array([each["angle"] for each in drawn])
+    assert 1.0 < angles.min() < 1.05 and 2.95 < angles.max() < 3.0
+    assert angles.mean() == pytest.approx(2.0, abs=0.1)
+    assert drawn[0]["place"].shape == (2,)
+    assert {each["side"] for each in drawn} == {"left", "right"}
+    with pytest.raises(ValueError, match="draw of angle must be given where a bound is infinite"):
+        Option(name="angle", about="an angle", low=1.0)

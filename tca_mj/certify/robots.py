@@ -20,7 +20,7 @@ from tca_mj.certify.cases import Case
 from tca_mj.certify.outcomes import POSITION, ROTATION, Effort, Outcome, judge
 from tca_mj.certify.rest import Load
 from tca_mj.certify.subjects import Subject, read
-from tca_mj.checks import Array, number, within
+from tca_mj.checks import Array, Count, Positive, door, within
 from tca_mj.machine import machine, versions
 from tca_mj.model.chain import MOTIONS
 from tca_mj.model.part import Part
@@ -50,10 +50,11 @@ Answer: TypeAlias = tuple[Asked, Outcome, bool]
 """A case, its answer, and whether that is within the bounds."""
 
 
+@door
 def certify_robot(
     robot: Part | str, *, hot: ArrayLike = HOT, gravity: ArrayLike | None = None,
-    nodes: int | None = None, position: float = POSITION, rotation: float = ROTATION,
-    out: Path | None = None, workers: int = 1,
+    nodes: Count | None = None, position: Positive = POSITION, rotation: Positive = ROTATION,
+    out: Path | None = None, workers: Count = 1,
 ) -> dict[str, Any]:  # fmt: skip
     """Compares a part at rest with the theory of rods: cold, each TCA hot, each two, and all.
 
@@ -78,8 +79,6 @@ def certify_robot(
         ValueError: If an argument is out of range, there is no such function, or theory does not
             cover the part; the message names the part and the body.
     """
-    number("position", position, above=0.0)
-    number("rotation", rotation, above=0.0, unit="rad")
     part = robot if isinstance(robot, Part) else built(robot, nodes)
     if nodes is not None and isinstance(robot, Part):
         raise ValueError(f"nodes must be None where robot is a Part, got {nodes}")

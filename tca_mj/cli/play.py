@@ -139,7 +139,7 @@ def speed_table(summary: dict[str, Any]) -> str:
 
 def _export(arguments: argparse.Namespace) -> int:
     """Writes the curves of a recording as one table: a row for every time, a column with its unit
-    for every curve. In Python, `tca_mj.record.reader.read` gives the same as arrays.
+    for every curve. In Python, `tca_mj.record.read` gives the same as arrays.
 
     With --onnx, writes the network of a policy for other runtimes: `observation`, float32 of shape
     (batch, n) in the units of the task, becomes `action`; normalisation is part of it. Needs

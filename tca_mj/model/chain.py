@@ -68,6 +68,7 @@ class Member:
     nodes: int
     motions: tuple[Motion, ...]
 
+    @door
     def renamed(self, prefix: str) -> Member:
         """The same chain in a part whose names all got ``prefix`` in front."""
         return replace(self, name=prefix + self.name)
@@ -86,20 +87,24 @@ class Member:
 
     def joints(self, node: int) -> dict[Motion, str]:
         """Names of the joints of a node by their motion, from base to tip."""
+        whole("node", node, at_least=0, at_most=self.nodes - 1)
         order = self.motions if node % 2 == 0 else self.motions[::-1]
         return {motion: f"{self.name}.{motion}{node}" for motion in order}
 
     def body(self, piece: int) -> str:
         """Name of the body of a piece."""
-        return f"{self.name}.piece{piece}"
+        return f"{self.name}.piece{self._piece(piece)}"
 
     def skin(self, piece: int) -> str:
         """Name of the geom with its mass and surface."""
-        return f"{self.name}.skin{piece}"
+        return f"{self.name}.skin{self._piece(piece)}"
 
     def local(self, piece: int) -> float:
         """z of the piece's point in the piece's own frame [m]."""
-        return 0.0 if piece == 0 else self.piece / 2.0
+        return 0.0 if self._piece(piece) == 0 else self.piece / 2.0
+
+    def _piece(self, piece: int) -> int:
+        return whole("piece", piece, at_least=0, at_most=self.nodes)
 
 
 class Holder(Protocol):
@@ -152,7 +157,6 @@ class Chain:
 
     def local(self, piece: int) -> float:
         """z of the piece's point in the piece's own frame [m]."""
-        whole("piece", piece, at_least=0, at_most=self.nodes)
         return self.member.local(piece)
 
     def extent(self, piece: int) -> float:

@@ -52,6 +52,7 @@ class Part(Checked):
         """A part like this one, with a specification of its own."""
         return replace(self, spec=self.spec.copy(), sites=dict(self.sites))
 
+    @door
     def export(
         self, path: str | Path | None = None, *, temperatures: ArrayLike | None = None
     ) -> str:

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 from rerun.chunk import RrdReader
 
-from tca_mj.checks import Array
+from tca_mj.checks import Array, door
 from tca_mj.files import write_whole
 
 UNITS = {
@@ -51,6 +51,7 @@ class Recording:
     events: tuple[tuple[float, str], ...]
 
 
+@door
 def read(path: str | Path) -> Recording:
     """Reads a recording that ``Recorder`` has written.
 
@@ -97,6 +98,7 @@ def read(path: str | Path) -> Recording:
     return Recording(curves, tuple(sorted(texts)))
 
 
+@door
 def write_csv(recording: Recording, path: str | Path) -> None:
     """Writes the curves as one table: a row for every time, a column with its unit for each curve.
 

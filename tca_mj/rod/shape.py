@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tca_mj.checks import Array
+from tca_mj.checks import Array, within
 
 _STRAIGHT = 1e-9  # what turns less bends in no plane [rad]
 
@@ -22,7 +22,13 @@ def bend(axes: Array) -> float:
 
     Returns:
         The angle, never negative; of two axes at most π [rad].
+
+    Raises:
+        ValueError: If there are less than two axes, or they are none.
     """
+    axes = within("axes", axes, at_least=-1.0 - _STRAIGHT, at_most=1.0 + _STRAIGHT)
+    if axes.ndim != 2 or axes.shape[1] != 3 or len(axes) < 2:
+        raise ValueError(f"axes must be finite numbers of shape (n, 3), n at least 2, got {axes}")
     first, last = axes[0], axes[-1]
     angle = float(np.arctan2(np.linalg.norm(np.cross(first, last)), first @ last))
     about = np.cross(axes[:-1], axes[1:]).sum(axis=0)
