@@ -132,7 +132,7 @@ class TetrapodCourse(SimulatedTask):
 
     Terminates at the finish, which is a success if nothing was touched or damaged, or when the
     robot has fallen. Truncates after the time limit, and with ``info["truncation_reason"]`` if a
-    TCA is too hot or torn, or if the simulation diverged.
+    TCA or a spine is too hot, a TCA torn, or if the simulation diverged.
     """
 
     max_power: ClassVar[NDArray[np.float64]] = np.array([4.0] * 12 + [40.0] * 3)  # [W]

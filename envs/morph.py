@@ -94,7 +94,6 @@ class MorphModule(SimulatedTask):
     max_power = 40.0  # about 25 V at the TCA, Sun, Section 6.2.1 [W]
     response = 0.2  # twice the time between two updates, in which 40 W are 30 K; estimate [s]
     max_temperature = 180.0  # annealing temperature of the TCA, Sun, Table 2.1 [°C]
-    max_spine_temperature = 160.0  # an estimate, as in ``MorphSequence`` [°C]
     tolerance = math.radians(3.0)  # Sun, Section 6.2.1, calls this steady [rad]
     hold_time = 3.0  # time at the goal [s]
     start_range = (0.0, math.pi)
@@ -261,8 +260,6 @@ class MorphModule(SimulatedTask):
         """What the module does not survive, or None."""
         if some(self.sim.spines.damaged):
             return "damaged: the TCA contracted against a stiff spine"
-        if self.sim.spines.temperature[0] > self.max_spine_temperature:
-            return f"overheated: spine above {self.max_spine_temperature} °C"
         return super().harm()
 
     def details(self) -> dict[str, Any]:

@@ -155,7 +155,8 @@ class SimulatedTask(gym.Env[Observation, Action], ABC):
         response: Time in which the thermostats would make up for an error; None for that between
             two updates of the TCAs. They know the nominal heat loss: on a robot that loses more or
             less they are off, the less the faster they are [s].
-        max_temperature: Temperature that ends an episode [°C].
+        max_temperature: Temperature of a TCA that ends an episode [°C].
+        max_spine_temperature: Temperature of a spine that ends an episode [°C].
         hot_temperature: Temperature from which on heat is charged [°C].
         terms: Names of the terms of the reward.
         scripted: ``module:callable`` that makes its scripted policy from the task, or such a
@@ -185,6 +186,7 @@ class SimulatedTask(gym.Env[Observation, Action], ABC):
     safe_temperature: ClassVar[float] = 172.0
     response: ClassVar[float | None] = None
     max_temperature: ClassVar[float] = 180.0
+    max_spine_temperature: ClassVar[float] = 160.0  # an estimate, as in ``MorphSequence``
     hot_temperature: ClassVar[float] = np.inf
     terms: ClassVar[tuple[str, ...]] = ("energy",)
     energy_price: ClassVar[float] = 0.0
@@ -477,6 +479,10 @@ class SimulatedTask(gym.Env[Observation, Action], ABC):
         if some(hot):
             name = sim.tca_names[int(np.argmax(hot))]
             return f"overheated: {name} above {self.max_temperature} °C"
+        burnt = sim.spines.temperature > self.max_spine_temperature
+        if burnt.any():
+            name = sim.spines.names[int(np.argmax(burnt))]
+            return f"overheated: {name} above {self.max_spine_temperature} °C"
         torn = sim.tension > sim.bank.breaking_force
         if some(torn):
             i = int(np.argmax(torn))

@@ -307,3 +307,17 @@ def test_the_demo_writes_what_happened(tmp_path):
     assert "| crawl |" in speed_table(result) and "2.40 mm/s" in speed_table(result)
     assert "scripted in TCA/TetrapodCourse-v0: stopped after 0.5 s" in outcome(result)
     assert result["touched_plate"] is False and result["damaged"] is False
+
+
+def test_a_spine_that_is_heated_for_long_is_too_hot_and_has_not_diverged():
+    env = TetrapodCourse()
+    env.reset(seed=0)
+    action, truncated, info = np.where(np.arange(ACTION.size) == 16, 1.0, -1.0), False, {}
+    for step in range(200):  # noqa: B007
+        _, _, _, truncated, info = env.step(action.astype(np.float32))
+        if truncated:
+            break
+    assert info["truncation_reason"] == "overheated: robot.spine1 above 160.0 °C"
+    assert 160.0 < info["spine_temperature"][1] < 165.0 < OBSERVATION.space.high[46]
+    assert info["cost"] == 1.0
+    assert 50 < step < 150

@@ -199,7 +199,7 @@ def test_a_tca_heated_against_a_stiff_spine_ends_the_episode(shared):
 
 @pytest.mark.parametrize("part", ["spine", "TCA"])
 def test_too_much_heat_ends_the_episode(shared, part):
-    where = "bench.module.tca" if part == "TCA" else part
+    where = f"bench.module.{part.lower()}"
     shared.reset(seed=0, options={"start": 0.0})
     for k in range(200):
         power = -0.4 if part == "TCA" and k >= 75 else -1.0

@@ -87,6 +87,32 @@ def test_a_thermostat_brings_there_and_keeps():
     assert power == pytest.approx(np.asarray(bank.heat.loss) * (goal - 25.0), rel=1e-3, abs=1e-9)
 
 
+@pytest.mark.parametrize("share", [1.0, 0.5, 0.1])
+def test_a_thermostat_lets_go_above_its_limit(share):
+    """Its feedback alone would be off by (1 - share) loss (T - T_amb) response / capacity."""
+    bank, nominal = TcaBank(SPECS), heat_of(SPECS)
+    limit, response = 150.0, 4.0
+    thermostat = Thermostat(
+        heat=nominal, max_power=20.0, max_temperature=limit, response=response
+    )  # fmt: skip
+    bank.supply = Supply(quantity="temperature", thermostat=thermostat)
+    loss, capacity = np.asarray(nominal.loss), np.asarray(nominal.capacity)
+    off = (1.0 - share) * loss * (limit - 25.0) * response / capacity
+    bank.heat = replace(nominal, loss=share * loss)
+    state = bank.rest()
+    for _ in range(int(60.0 / DT)):
+        state, _ = bank.advance(state, np.full(3, limit), bank.rest_length, DT)
+    assert state.temperature.max() < limit + 5.0
+    if share == 1.0:
+        assert state.temperature == pytest.approx(np.full(3, limit), abs=1e-6)
+    elif share == 0.1:
+        assert (off > 10.0).all() and (state.temperature > limit + 1.0).all()
+    hot = limit + np.array([0.9, 3.0, 5.0])
+    full = loss * (limit - 25.0) - capacity * (hot - limit) / response
+    power = thermostat.power(hot, np.full(3, limit), np.full(3, limit))
+    assert power == pytest.approx(np.maximum(full, 0.0) * [1.0, 0.5, 0.0], rel=1e-12)
+
+
 def test_cold_is_off_and_too_hot_is_cut():
     bank = TcaBank(SPECS)
     bank.supply = held(max_voltage=1.0)

@@ -283,12 +283,14 @@ class _Hand:
 
 
 def drawn(options: Options, random: Random) -> dict[str, Any] | None:
-    """Values of some options, each within its bounds; None half the time."""
+    """Values of some options, each within its bounds, factors by their logarithm; or None."""
     found: dict[str, Any] = {}
     for row in options.rows:
         chosen = random.random() < 0.4
         if row.choices:
             value: Any = str(random.choice(row.choices))
+        elif 0.0 < 10.0 * row.low <= row.high:  # factors: as often below 1 as above
+            value = float(np.exp(random.uniform(np.log(row.low), np.log(row.high))))
         elif np.isfinite([row.low, row.high]).all():
             value = random.uniform(row.low, row.high, row.shape or None)
         else:

@@ -19,6 +19,10 @@ from tca_mj.checks import Array, Checked, Limits, Positives, within
 from tca_mj.tca.thermal import HeatSpec, power_from_voltage
 
 Quantity = Literal["power", "voltage", "current", "temperature"]
+# A thermostat gives no power from so far above its limit on, and less over the last of it [K].
+# Estimates: the TCAs of the tasks anneal 8 K above their limit, and where the heat loss is the
+# nominal one they get no hotter than 1 K above it.
+_CUT_OUT, _LETTING_GO = 5.0, 4.0
 UNITS: dict[Quantity, str] = {"power": "W", "voltage": "V", "current": "A", "temperature": "°C"}
 
 
@@ -27,6 +31,8 @@ class Thermostat(Checked):
     """Power that brings TCAs to a temperature: what keeps T* + C (T* - T)/τ, within limits.
 
     What keeps a bare TCA is λ (T* - T_amb); one in a soft body also warms that, G (T* - T_body).
+    Where less heat is lost than this assumes, a TCA gets hotter than it ought to be. From 1 K above
+    ``max_temperature`` on there is therefore less power, and from 5 K on none.
 
     Attributes:
         heat: Thermal constants, arrays of shape (n,).
@@ -66,7 +72,9 @@ class Thermostat(Checked):
         heat, error = self.heat, goal - temperature
         steady = heat.loss * (goal - heat.ambient) + heat.conductance * (goal - body)
         power = steady + heat.capacity * error / self.response
-        return np.minimum(np.maximum(power, 0.0), self.max_power)
+        power = np.minimum(np.maximum(power, 0.0), self.max_power)
+        share = (self.max_temperature + _CUT_OUT - temperature) / _LETTING_GO
+        return power * np.minimum(np.maximum(share, 0.0), 1.0)
 
 
 @dataclass(frozen=True, kw_only=True, slots=True, eq=False)
