@@ -65,7 +65,7 @@ class Form:
         """
         self._total, self._factors = Total(place, size), factors
         each = np.asarray(coefficient, dtype=np.float64).ravel()
-        self._coefficient = np.repeat(each, place.size // each.size)
+        self._coefficient = np.repeat(each, place.size // max(each.size, 1))
         self._plain = bool((self._coefficient == 1.0).all())
 
     def of(self, first: Array, second: Array | None = None) -> Array:
