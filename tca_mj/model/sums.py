@@ -39,6 +39,8 @@ class Total:
     def of(self, values: Array) -> Array:
         """Shape (..., k) to (..., size)."""
         lead = values.shape[:-1]
+        if not self.place.size:
+            return np.zeros((*lead, self.size))
         if not lead:
             return np.bincount(self.place, values, self.size)  # type: ignore[return-value]
         many = math.prod(lead)
