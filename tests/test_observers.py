@@ -251,16 +251,16 @@ def test_what_is_not_written_whole_is_not_written(
 
 
 def test_a_full_disk_ends_the_recording_and_not_the_episode(tmp_path: Path) -> None:
-    """In a process whose files may have 150 kB, less than the recording needs."""
+    """In a process whose files may have 150 kB once the recording has begun."""
     script = """
 import json, resource, sys, warnings
 import gymnasium as gym, numpy as np
 from tca_mj.envs.wrappers import RecordRerun
-resource.setrlimit(resource.RLIMIT_FSIZE, (150_000, 150_000))
 env = RecordRerun(gym.make("TCA/BendReach-v0"), sys.argv[1], chunk=5)
 with warnings.catch_warnings(record=True) as said:
     warnings.simplefilter("always")
     env.reset(seed=0)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (150_000, 150_000))
     rewards = [env.step(np.zeros(3, dtype=np.float32))[1] for _ in range(60)]
     env.reset(seed=0)
     env.event("unheard")
