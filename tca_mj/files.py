@@ -181,7 +181,7 @@ def _locked(path: Path) -> int | None:
             path.unlink(missing_ok=True)
             warnings.warn(
                 f"{path.parent} cannot be locked: {error}; no other process must work in it",
-                stacklevel=5,
+                RuntimeWarning, stacklevel=5,
             )
             return None
         if _same(lock, path):

@@ -2,6 +2,7 @@
 
 import re
 import runpy
+import tempfile
 from pathlib import Path
 
 import gymnasium as gym
@@ -63,6 +64,7 @@ def test_ids_in_the_pages_are_registered():
 def test_examples_run(page, source, tmp_path, monkeypatch):
     """Marked ``python``; ``python no-run`` is skipped. Episodes are cut to five steps."""
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))  # what others leave there
     for name, spec in gym.registry.items():
         if name.startswith("TCA/"):
             monkeypatch.setattr(spec, "max_episode_steps", 5)

@@ -7,7 +7,7 @@ from stable_baselines3 import PPO
 from stable_baselines3.common.monitor import Monitor
 from stable_baselines3.common.vec_env import DummyVecEnv, VecMonitor, VecNormalize
 
-from tca_mj.agents.train.sb3_env import TaskVecEnv
+from tca_mj.agents.train.sb3_env import TaskVecEnv, silence
 from tca_mj.registry import TASKS
 
 QUICK = "TCA/MorphModule-v0"
@@ -89,6 +89,7 @@ def test_a_learner_learns_from_it_normalised():
             "MlpPolicy", VecNormalize(VecMonitor(envs)), n_steps=32, batch_size=32, n_epochs=2,
             seed=0, device="cpu",
         )  # fmt: skip
+        silence(learner)
         learner.learn(128)
         assert learner.ep_info_buffer and learner.ep_info_buffer[0]["l"] <= 20
         policies.append(learner.policy.state_dict())
