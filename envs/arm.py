@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tca_mj.assets import mjcf
+from tca_mj.checks import door, require_one_of
 from tca_mj.envs.options import Option, Options, Setup, Uniform, variation_options
 from tca_mj.envs.rewards import tolerance
 from tca_mj.envs.table import Entry, Table
@@ -18,7 +19,7 @@ from tca_mj.envs.task import SimulatedTask, TaskArguments, Verdict, parts
 from tca_mj.envs.vector import TaskVector
 from tca_mj.model.scene import scene
 from tca_mj.robots.arm import ArmSpec, arm
-from tca_mj.sim import Drive, Simulation
+from tca_mj.sim import Drive, Simulation, Timestep
 
 # Objects, with the width that the gripper has to reach round [m].
 OBJECTS = {"screwdriver": 8e-3, "pcb": 3.6e-3}
@@ -109,11 +110,12 @@ class ArmPickPlace(SimulatedTask):
     robot_argument = ("arm_spec", ArmSpec)
     film_speed = 4.0
 
+    @door
     def __init__(
         self,
         *,
         arm_spec: ArmSpec | None = None,
-        timestep: float = 5e-3,
+        timestep: Timestep = 5e-3,
         **common: Unpack[TaskArguments],
     ) -> None:
         """Builds the scene.
@@ -128,6 +130,7 @@ class ArmPickPlace(SimulatedTask):
         """
         parts("timestep", type(self).control_period, timestep, of=5)
         self.arm_spec = arm_spec or ArmSpec()
+        require_one_of("arm_spec.bending.count", self.arm_spec.bending.count, (3,))
         files = ["cup", *(name for kind in OBJECTS for name in (kind, f"{kind}_stand"))]
         part = scene(
             mjcf("arena.xml"), arm(self.arm_spec), {f: mjcf(f"{f}.xml") for f in files}, name="arm"
@@ -146,6 +149,7 @@ class ArmPickPlace(SimulatedTask):
         self._in_cup, self._carried = 0, False
         self._find(self.model)
         self._progress, _ = self._measure()
+        self._try("arm_spec", arm_spec)
 
     def _options(self) -> Options:
         reach, (near, far) = self.object_range, self.cup_range

@@ -11,13 +11,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tca_mj.assets import mjcf
+from tca_mj.checks import door
 from tca_mj.envs.options import Option, Options, Setup, Uniform, variation_options
 from tca_mj.envs.stance import CAMERAS, Stance, tetrapod_scene
 from tca_mj.envs.table import Entry, Table
 from tca_mj.envs.task import Headway, SimulatedTask, TaskArguments, Verdict, parts
 from tca_mj.envs.vector import TaskVector
 from tca_mj.robots.tetrapod import LEGS, SPINES, TetrapodSpec
-from tca_mj.sim import Drive
+from tca_mj.sim import Drive, Timestep
 from tca_mj.smp import HeaterSpec, SpineSpec
 
 TCAS = 3 * len(LEGS) + SPINES
@@ -147,12 +148,13 @@ class TetrapodCourse(SimulatedTask):
     film_speed = 30.0
     published_speed = {"crawl": 2.4e-3, "walk": 9e-3, "shimmy": 0.75e-3}  # Sun, Section 6.3.2 [m/s]
 
+    @door
     def __init__(
         self,
         *,
         robot: TetrapodSpec | None = None,
-        timestep: float = 5e-3,
-        tca_period: float = 2.5e-2,
+        timestep: Timestep = 5e-3,
+        tca_period: Timestep = 2.5e-2,
         **common: Unpack[TaskArguments],
     ) -> None:
         """Builds the scene.
@@ -177,6 +179,7 @@ class TetrapodCourse(SimulatedTask):
         self._find(self.model)
         self.touched = False
         self._x, self._harmed = 0.0, 0
+        self._try("robot", robot)
 
     def _find(self, model: mujoco.MjModel) -> None:
         """Looks up the addresses of what is observed and judged."""

@@ -9,10 +9,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tca_mj.assets import mjcf
+from tca_mj.checks import door, number, require_one_of, within
 from tca_mj.model.part import Part, new_spec
 from tca_mj.model.scene import scene
 from tca_mj.modules.bending import BendingSpec, bending_module
-from tca_mj.sim import Simulation
+from tca_mj.sim import Simulation, Timestep
 from tca_mj.tca import Supply
 
 TCAS = 3
@@ -38,7 +39,8 @@ class StaticTip:
         sim: The module in its scene; what is asked for changes its state.
     """
 
-    def __init__(self, spec: BendingSpec, *, timestep: float = 5e-3) -> None:
+    @door
+    def __init__(self, spec: BendingSpec, *, timestep: Timestep = 5e-3) -> None:
         """Builds the scene.
 
         Args:
@@ -49,8 +51,7 @@ class StaticTip:
             ValueError: If the module has not three TCAs or cannot be built, or the time step fits
                 ``PERIOD`` not.
         """
-        if spec.count != TCAS:
-            raise ValueError(f"module_spec must have {TCAS} TCAs, got {spec.count}")
+        require_one_of("module_spec.count", spec.count, (TCAS,))
         self.sim = Simulation(
             hang(bending_module(spec), CLAMP.tolist(), _DOWN, "reach_stand"),
             timestep=timestep, tca_period=PERIOD,
@@ -81,14 +82,18 @@ class StaticTip:
         power that its heat loss takes.
 
         Args:
-            temperature: Temperatures, shape (3,), at least that of the surroundings [°C].
+            temperature: Temperatures, shape (3,), from that of the surroundings to 400 °C [°C].
 
         Raises:
+            ValueError: If a temperature is out of bounds.
             NoRest: If the tip still moves then.
             SimulationDiverged: If the module leaves what the TCAs' law holds for.
         """
         sim = self.sim
-        temperature = np.array(temperature, dtype=np.float64)
+        shape, coldest = (TCAS,), sim.bank.heat.ambient.min() - 1e-9
+        temperature = within(
+            "temperature", temperature, at_least=coldest, at_most=400.0, unit="°C", shape=shape
+        ).copy()
         sim.reset()
         power = sim.keep(temperature)
         given, sim.bank.supply = sim.bank.supply, Supply()  # a task may command temperatures
@@ -110,7 +115,7 @@ class StaticTip:
 
         Args:
             target: A place, from the clamp, shape (3,) [m].
-            hottest: Temperature that no TCA may pass [°C].
+            hottest: Temperature that no TCA may pass, above that of the surroundings [°C].
 
         Returns:
             The temperatures, shape (3,) [°C]; the derivative of the tip's place by them, shape
@@ -118,8 +123,10 @@ class StaticTip:
 
         Raises:
             NoRest, SimulationDiverged: As ``at``.
+            ValueError: If the target is no place, or the temperature out of bounds.
         """
-        target, ambient = np.asarray(target, dtype=np.float64), self.sim.bank.heat.ambient
+        target, ambient = within("target", target, shape=(3,)), self.sim.bank.heat.ambient
+        number("hottest", hottest, at_least=float(ambient.max()), at_most=400.0, unit="°C")
         # The TCA on the target's side is the hottest.
         angle = -2.0 * np.pi / TCAS * np.arange(TCAS)
         aside = np.cos(angle) * target[0] + np.sin(angle) * target[1]
@@ -150,6 +157,7 @@ class StaticTip:
         )
 
 
+@door
 def hang(module: Part, place: Sequence[float], turn: Sequence[float], stand: str) -> Part:
     """A scene in which ``module``, of that name, hangs from a stand.
 

@@ -10,7 +10,7 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tca_mj.checks import some
+from tca_mj.checks import door, some
 from tca_mj.envs.hanging import hang
 from tca_mj.envs.options import Option, Options, Setup, Uniform, variation_options
 from tca_mj.envs.rewards import tolerance
@@ -20,7 +20,7 @@ from tca_mj.envs.vector import TaskVector
 from tca_mj.model.part import Part
 from tca_mj.modules.morphing import MorphingSpec, morphing_module
 from tca_mj.record.render import colour_tendons
-from tca_mj.sim import Drive, Simulation
+from tca_mj.sim import Drive, Simulation, Timestep
 
 OBSERVATION = Table(
     [
@@ -105,11 +105,12 @@ class MorphModule(SimulatedTask):
     scripted_arguments = {"action": "power"}
     robot_argument = ("module_spec", _default)
 
+    @door
     def __init__(
         self,
         *,
         module_spec: MorphingSpec | None = None,
-        timestep: float = 5e-3,
+        timestep: Timestep = 5e-3,
         **common: Unpack[TaskArguments],
     ) -> None:
         """Builds the scene.
@@ -140,6 +141,7 @@ class MorphModule(SimulatedTask):
         self._at_goal = 0
         self._find(self.model, part)
         self._progress = self._measure(self.angle)
+        self._try("module_spec", module_spec)
 
     def _options(self) -> Options:
         return Options(

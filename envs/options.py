@@ -8,7 +8,17 @@ from typing import Any
 
 import numpy as np
 
-from tca_mj.envs.table import numbers
+from tca_mj.checks import (
+    Checked,
+    Count,
+    Edge,
+    Finite,
+    door,
+    instance,
+    require_one_of,
+    shown,
+    within,
+)  # fmt: skip
 from tca_mj.hints import nearest
 from tca_mj.variation import AMBIENT, AMBIENT_SPREAD, Variation
 
@@ -17,7 +27,7 @@ Setup = dict[str, Any]
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
-class Option:
+class Option(Checked):
     """A row of the table.
 
     Attributes:
@@ -35,7 +45,7 @@ class Option:
         check: Raises a ``ValueError`` for a value that bounds do not exclude.
 
     Raises:
-        ValueError: If there is nothing to draw from.
+        ValueError: If there is nothing to draw from, or a field is not of its kind.
     """
 
     name: str
@@ -44,8 +54,8 @@ class Option:
     drawn: str = "drawn"
     unit: str = "-"
     shape: tuple[int, ...] = ()
-    low: float = -np.inf
-    high: float = np.inf
+    low: Edge = -np.inf
+    high: Edge = np.inf
     choices: tuple[str, ...] = ()
     check: Callable[[Any], None] | None = None
 
@@ -72,16 +82,12 @@ class Option:
             ValueError: If it cannot be.
         """
         if self.choices:
-            if not isinstance(value, str) or value not in self.choices:
-                raise ValueError(
-                    f"{self.name} must be one of {sorted(self.choices)}, got {value!r}"
-                )
-            return value
-        array = numbers(self.name, value, self.shape)
+            return require_one_of(self.name, value, sorted(self.choices))
+        array = within(self.name, value, shape=self.shape).copy()
         if array.min() < self.low - 1e-9 or array.max() > self.high + 1e-9:
             raise ValueError(
                 f"{self.name} must be between {self.low:.6g} and {self.high:.6g}"
-                f"{'' if self.unit == '-' else ' ' + self.unit}, got {value}"
+                f"{'' if self.unit == '-' else ' ' + self.unit}, got {shown(value)}"
             )
         if self.check is not None:
             self.check(array)
@@ -95,6 +101,7 @@ class Options:
         rows: The rows, in the order in which they are drawn.
     """
 
+    @door
     def __init__(self, rows: Sequence[Option]) -> None:
         self.rows = tuple(rows)
 
@@ -109,10 +116,11 @@ class Options:
         Raises:
             ValueError: If an option is unknown or cannot have its value.
         """
+        instance("options", given, Mapping)
         unknown = [key for key in given if key not in self.names]
         if unknown:
             raise ValueError(
-                f"options must be some of {sorted(self.names)}, got {unknown}"
+                f"options must be some of {sorted(self.names)}, got {shown(unknown)}"
                 f"{nearest(unknown[0], self.names)}"
             )
         found: Setup = {}
@@ -149,7 +157,7 @@ class Constant:
 
 
 @dataclass(frozen=True, slots=True)
-class Uniform:
+class Uniform(Checked):
     """Draws numbers between two others, in the unit of the option.
 
     Attributes:
@@ -158,9 +166,9 @@ class Uniform:
         size: How many; None for one number, which is no array.
     """
 
-    low: float
-    high: float
-    size: int | None = None
+    low: Finite
+    high: Finite
+    size: Count | None = None
 
     def __call__(self, random: np.random.Generator, setup: Setup) -> Any:
         return random.uniform(self.low, self.high, self.size)

@@ -9,13 +9,14 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from tca_mj.checks import door
 from tca_mj.envs.hanging import CLAMP, PERIOD, TCAS, NoRest, StaticTip
 from tca_mj.envs.options import Constant, Option, Options, Setup, variation_options
 from tca_mj.envs.table import Entry, Table
 from tca_mj.envs.task import SimulatedTask, TaskArguments, Verdict
 from tca_mj.envs.vector import TaskVector
 from tca_mj.modules.bending import BendingSpec
-from tca_mj.sim import Drive, SimulationDiverged
+from tca_mj.sim import Drive, SimulationDiverged, Timestep
 
 _SIDES = (1, 3, 2)  # TCAs, left and right of the x-z plane swapped
 
@@ -34,6 +35,7 @@ ACTION = Table([Entry("TCA heating", TCAS, -1.0, 1.0, "-", off=-1.0, mirror=_SID
 
 _SETTLING = 0.5  # time in which the cold module comes to rest [s]
 _SHRINK = 0.8  # rise of temperature is cut to this share until the module comes to rest
+_TRIES = 12  # as often at most, which leaves a twelfth of it
 _NEAR = 1e-4  # how near to a given target the module has to rest [m]
 _SUPPLY = 0.9  # share of the largest power that is enough to stay at a target
 _COLDER, _COLDEST = 1.0, 0.75  # largest rise of the other two TCAs over that of the hottest
@@ -105,11 +107,12 @@ class BendReach(SimulatedTask):
     learning_steps = {"ppo": 60_000, "sac": 60_000}
     learning_arguments = {"action": "power"}
 
+    @door
     def __init__(
         self,
         *,
         module_spec: BendingSpec | None = None,
-        timestep: float = 5e-3,
+        timestep: Timestep = 5e-3,
         **common: Unpack[TaskArguments],
     ) -> None:
         """Builds the scene.
@@ -138,6 +141,7 @@ class BendReach(SimulatedTask):
         self.target_temperature = self.sim.temperature.copy()
         self._at_target = 0
         self._distance = self._gap()
+        self._try("module_spec", module_spec)
 
     def prepare(self, setup: Setup) -> None:
         """Finds the target; then the cold module comes to rest."""
@@ -161,19 +165,31 @@ class BendReach(SimulatedTask):
         """Where the tip rests at shares of the largest rise of temperature; and the temperatures.
 
         A module so far off that it finds no rest there is heated less.
+
+        Raises:
+            ValueError: If it finds none at a twelfth of that.
         """
         ambient, hottest = self.sim.bank.heat.ambient, self._hottest()
-        while True:
+        for _ in range(_TRIES):
             temperature = ambient + rise * (hottest - ambient)
             try:
                 return self.static.at(temperature), temperature
             except (NoRest, SimulationDiverged):
                 rise = _SHRINK * rise
+        spec = self.module_spec
+        raise ValueError(
+            f"module_spec must be one that rests with its TCAs {(rise / _SHRINK).max():.0%} of the"
+            f" way to {hottest:.0f} °C warm, as a shorter, thicker or stiffer one may, got"
+            f" {spec.length} m by {spec.diameter} m with {self._varied}"
+        )
 
     def _given_target(self, target: NDArray[np.float64]) -> NDArray[np.float64]:
         """Temperatures at which the tip rests at a given target."""
         hottest = self._hottest()
-        temperature, _, gap = self.static.inverse(target, hottest)
+        try:
+            temperature, _, gap = self.static.inverse(target, hottest)
+        except NoRest as error:
+            raise ValueError(f"target must be one at rest, got {target}: {error}") from error
         if gap > _NEAR:
             raise ValueError(
                 f"target must be where the tip can rest with TCAs of up to {hottest:.0f} °C, got"

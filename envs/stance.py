@@ -2,17 +2,20 @@
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
+from typing import Annotated
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from tca_mj.checks import Finite, Positive, door, number, require_one_of, row
 from tca_mj.model.part import Part
 from tca_mj.model.scene import scene
 from tca_mj.robots.tetrapod import LEGS, TetrapodSpec, rigid_tetrapod, set_rigid_bend, tetrapod
 from tca_mj.robots.tetrapod_fine import fine_tetrapod
-from tca_mj.sim import Simulation
+from tca_mj.sim import Simulation, Timestep
 
 Array = NDArray[np.float64]
 
@@ -43,15 +46,20 @@ _IMPEDANCE_RATIO = 3000.0
 _MARCH = 2e-3  # step downwards while the ground is looked for [m]
 _SPREAD = 0.12  # largest bend of each node of a leg that starts beside a beam [rad]
 _HALVINGS = 14
+_scene = {"at_least": -10.0, "at_most": 10.0, "unit": "m"}  # no arena is larger
+_Bend = Annotated[float, partial(number, at_least=-2.0 * math.pi, at_most=2.0 * math.pi)]
+_Spot = Annotated[tuple[float, float], partial(row, shape=(2,), **_scene)]
+_Height = Annotated[float, partial(number, **_scene)]
 
 
+@door
 def tetrapod_scene(
     arena: Path,
     objects: Mapping[str, Path],
     spec: TetrapodSpec,
     *,
-    timestep: float,
-    period: float,
+    timestep: Timestep,
+    period: Positive,
     body: str = "elastic",
     bend: float = 0.0,
 ) -> Simulation:
@@ -71,8 +79,8 @@ def tetrapod_scene(
     Raises:
         ValueError: If a file is missing, a time is bad or the robot cannot be built.
     """
-    if body not in BODIES:
-        raise ValueError(f"body must be one of {list(BODIES)}, got {body!r}")
+    require_one_of("body", body, BODIES)
+    require_one_of("robot.leg.count", spec.leg.count, (LEG_TCAS // len(LEGS),))
     if body == "fine":
         robot = fine_tetrapod(spec, nodes=spec.nodes, leg_nodes=spec.leg.nodes)
     else:
@@ -118,6 +126,7 @@ class Stance:
         feet: Ids of the sites in the middle of its feet, in the order of ``LEGS``.
     """
 
+    @door
     def __init__(self, sim: Simulation, spec: TetrapodSpec) -> None:
         """Looks up its addresses in ``sim``, which was built of ``spec``."""
         model = self._model = sim.model
@@ -154,6 +163,7 @@ class Stance:
         """Angle between the ends of the spines, 0 if they are straight [rad]."""
         return self._bend if self._rigid else float(self._signs @ data.qpos[self._bends])
 
+    @door
     def shape(self, bend: float) -> None:
         """Makes a rigid body one of another shape; an elastic one takes its own."""
         if self._rigid:
@@ -186,13 +196,14 @@ class Stance:
             touched[legs[legs >= 0]] = 1.0
         return touched
 
+    @door
     def placer(
         self,
         *,
-        bend: float,
-        position: tuple[float, float] = (0.0, 0.0),
-        yaw: float = 0.0,
-        above: float = 0.0,
+        bend: _Bend,
+        position: _Spot = (0.0, 0.0),
+        yaw: Finite = 0.0,
+        above: _Height = 0.0,
     ) -> Callable[[mujoco.MjData], None]:
         """What ``Simulation.reset`` needs to put the robot onto what is below it.
 
@@ -200,13 +211,14 @@ class Stance:
         sides of what it stands astride of.
 
         Args:
-            bend: Angle between the ends of the spines [rad].
-            position: x and y of the hub [m].
+            bend: Angle between the ends of the spines, within a turn [rad].
+            position: x and y of the hub, within 10 m [m].
             yaw: Direction that it looks into, from world x [rad].
-            above: Height of what it is put onto [m].
+            above: Height of what it is put onto, within 10 m [m].
 
         Raises:
-            ValueError: When it is called, if there is nothing at that height.
+            ValueError: If a number is out of bounds; when it is called, if there is nothing at that
+                height.
         """
 
         def place(data: mujoco.MjData) -> None:

@@ -4,22 +4,28 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from functools import partial
+from typing import Annotated, Any
 
 import numpy as np
 from gymnasium.spaces import Box
 from numpy.typing import ArrayLike, NDArray
 
-from tca_mj.checks import every
+from tca_mj.checks import (
+    Checked, Edge, Finite, Positive, door, every, instance, shown, whole, within,
+)  # fmt: skip
+
+_Size = Annotated[int, partial(whole, at_least=1, at_most=10_000)]  # as long as a picture is wide
+_EDGE = 1.0 + 1e-6  # of actions, which rounding may leave a little outside
 
 
 @dataclass(frozen=True, slots=True)
-class Entry:
+class Entry(Checked):
     """A row of a table.
 
     Attributes:
         name: What it is.
-        size: How many numbers it takes.
+        size: How many numbers it takes, 1 to 10 000.
         low: Lower bound [``unit``, as all numbers of the row].
         high: Upper bound [``unit``].
         unit: Unit, ``-`` for none.
@@ -30,23 +36,29 @@ class Entry:
             bounds.
         mirror: Where each number comes from in the mirror that swaps left and right: a place in
             the row, from 1, negative if the sign changes; empty if nothing does.
+
+    Raises:
+        ValueError: If a field is out of its bounds, low above high, or the mirror no mirror.
     """
 
     name: str
-    size: int
-    low: float
-    high: float
+    size: _Size
+    low: Edge
+    high: Edge
     unit: str
-    off: float | None = None
-    centre: float = 0.0
-    scale: float | None = None
+    off: Finite | None = None
+    centre: Finite = 0.0
+    scale: Positive | None = None
     mirror: tuple[int, ...] = ()
 
     def __post_init__(self) -> None:
+        Checked.__post_init__(self)
+        if self.low > self.high:
+            raise ValueError(f"low must be at most high, {self.high}, got {self.low}")
         if self.mirror and sorted(abs(k) for k in self.mirror) != list(range(1, self.size + 1)):
             raise ValueError(
                 f"mirror must name each of the {self.size} places of {self.name} once,"
-                f" got {self.mirror}"
+                f" got {shown(self.mirror)}"
             )
 
 
@@ -60,6 +72,7 @@ class Table:
         symmetric: Whether it says what a mirror makes of it.
     """
 
+    @door
     def __init__(self, entries: Sequence[Entry]) -> None:
         self.entries = tuple(entries)
         self.slices: dict[str, slice] = {}
@@ -83,8 +96,15 @@ class Table:
         self._source = np.array([start + abs(k) - 1 for start, k in places], dtype=np.int64)
         self._sign = np.array([np.sign(k) for _, k in places], dtype=np.float32)
 
+    @door
     def covering(self, bounds: Mapping[str, tuple[float, float]]) -> Table:
-        """The table with rows that reach at least as far as the given bounds, by name."""
+        """The table with rows that reach at least as far as the given bounds, by name.
+
+        Raises:
+            ValueError: If there is no such row, or a bound is no number.
+        """
+        if bounds.keys() - self.slices.keys():
+            raise ValueError(f"bounds must be of rows {list(self.slices)}, got {shown(bounds)}")
         wider = (
             replace(e, low=min(e.low, bounds[e.name][0]), high=max(e.high, bounds[e.name][1]))
             if e.name in bounds else e
@@ -133,8 +153,10 @@ class Table:
         Raises:
             ValueError: If a row is missing, unknown or of the wrong size.
         """
+        instance("values", values, Mapping)
         if values.keys() != self.slices.keys():
-            raise ValueError(f"values must be {sorted(self.slices)}, got {sorted(values)}")
+            found = sorted(map(str, values))
+            raise ValueError(f"values must be {sorted(self.slices)}, got {found}")
         flat: list[float] = []
         for name, size in self._sizes:
             row = values[name]
@@ -176,17 +198,6 @@ class Table:
         return "\n".join(lines)
 
 
-def numbers(name: str, value: Any, shape: tuple[int, ...]) -> NDArray[np.float64]:
-    """``value`` as real, finite numbers of the given shape, or a ``ValueError`` that names it."""
-    try:
-        array = np.asarray(value)
-        if array.shape == shape and array.dtype.kind in "iuf" and every(np.isfinite(array)):
-            return array.astype(np.float64)
-    except (TypeError, ValueError):
-        pass
-    raise ValueError(f"{name} must be finite numbers of shape {shape}, got {value!r}")
-
-
 def commands(name: str, value: Any, shape: tuple[int, ...]) -> NDArray[np.float64]:
     """Actions as numbers within -1 and 1; beyond by a rounding they are on the bound.
 
@@ -197,7 +208,5 @@ def commands(name: str, value: Any, shape: tuple[int, ...]) -> NDArray[np.float6
         command = value.astype(np.float64)
         if every(np.abs(command) <= 1.0):
             return command
-    command = numbers(name, value, shape)
-    if np.abs(command).max() > 1.0 + 1e-6:
-        raise ValueError(f"{name} must be within -1 and 1, got {command}")
+    command = within(name, value, at_least=-_EDGE, at_most=_EDGE, shape=shape)
     return np.clip(command, -1.0, 1.0)

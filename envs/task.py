@@ -14,12 +14,13 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tca_mj.checks import number, some
+from tca_mj.checks import door, quantity, require_one_of, shown, some, whole
 from tca_mj.envs.options import Option, Options, Setup, variation_of, variation_options
-from tca_mj.envs.table import Entry, Table, commands, numbers
+from tca_mj.envs.table import Entry, Table, commands
 from tca_mj.model.part import Part
-from tca_mj.record.render import Offscreen, colour_tendons
-from tca_mj.sim import Drive, Simulation, SimulationDiverged, SimulationOverheated
+from tca_mj.record.render import Offscreen, Pixels, colour_tendons
+from tca_mj.registry import ControlPeriod
+from tca_mj.sim import Drive, Simulation, SimulationDiverged, SimulationOverheated, Timestep
 from tca_mj.state import SimulationState, get_state, set_state
 from tca_mj.tca import HeatSpec, Supply, Thermostat
 from tca_mj.variation import AMBIENT, Nominal, Variation
@@ -93,11 +94,11 @@ class TaskArguments(TypedDict, total=False):
 
     Attributes:
         action: What the TCAs are told, ``temperature`` (by default) or ``power``.
-        control_period: Time of a step, a multiple of the time between two updates of the TCAs; by
-            default the class's [s].
+        control_period: Time of a step, a multiple of the time between two updates of the TCAs, at
+            most 60 s; by default the class's [s].
         render_mode: None or ``"rgb_array"``.
         camera: Camera of the pictures, one of the class's ``cameras``; by default the first.
-        size: Width and height of the pictures, by default 960 by 720 [pixels].
+        size: Width and height of the pictures, 1 to 8192, by default 960 by 720 [pixels].
     """
 
     action: str
@@ -139,7 +140,8 @@ class SimulatedTask(gym.Env[Observation, Action], ABC):
     measured at; ``tension`` [N]; ``damaged``, whether a TCA was contracted against a stiff spine;
     ``variation``, by how much the robot is off; ``success``; after a step also ``reward_terms`` and
     ``cost``, apart from the reward: for each TCA above ``hot_temperature`` its share of the way to
-    ``max_temperature``, and 1 for damage.
+    ``max_temperature``, and 1 for damage. Where the simulation has diverged, what is not finite is
+    0 there.
 
     Attributes:
         sim: The simulation.
@@ -221,8 +223,9 @@ class SimulatedTask(gym.Env[Observation, Action], ABC):
     _off: NDArray[np.float64]
     _half_range: float | NDArray[np.float64]
 
+    @door
     def __init__(
-        self, *, spec: Any = None, timestep: float = 5e-3, **common: Unpack[TaskArguments]
+        self, *, spec: Any = None, timestep: Timestep = 5e-3, **common: Unpack[TaskArguments]
     ) -> None:
         """Builds what the class says.
 
@@ -247,6 +250,7 @@ class SimulatedTask(gym.Env[Observation, Action], ABC):
         options = Options([*kind.option_rows, *variation_options()])
         self._open(sim, Table(kind.rows), Table([heating]), options, **common)
 
+    @door
     def _open(
         self,
         sim: Simulation,
@@ -255,10 +259,10 @@ class SimulatedTask(gym.Env[Observation, Action], ABC):
         options: Options,
         *,
         action: str = HEATINGS[0],
-        control_period: float | None = None,
+        control_period: ControlPeriod | None = None,
         render_mode: str | None = None,
         camera: str | None = None,
-        size: tuple[int, int] = (960, 720),
+        size: tuple[Pixels, Pixels] = (960, 720),
     ) -> None:
         """Takes what the task is made of, and ``TaskArguments``; to be called once by ``__init__``.
 
@@ -266,17 +270,11 @@ class SimulatedTask(gym.Env[Observation, Action], ABC):
             ValueError: If an argument is unknown or out of range, or the control period no multiple
                 of the time between two updates of the TCAs.
         """
-        modes, heating = self.metadata["render_modes"], action
-        if render_mode not in (None, *modes):
-            raise ValueError(f"render_mode must be None or one of {modes}, got {render_mode!r}")
-        if camera not in (None, *self.cameras):
-            raise ValueError(f"camera must be one of {list(self.cameras)}, got {camera!r}")
-        if numbers("size", size, (2,)).min() < 1.0:
-            raise ValueError(f"size must be at least 1 pixel each way, got {size}")
+        require_one_of("render_mode", render_mode, (None, *self.metadata["render_modes"]))
+        require_one_of("camera", camera, (None, *self.cameras))
         self.render_mode, self._size = render_mode, size
         self._camera = self.camera_prefix + (camera or self.cameras[0])
-        if heating not in HEATINGS:
-            raise ValueError(f"action must be one of {list(HEATINGS)}, got {heating!r}")
+        heating = require_one_of("action", action, HEATINGS)
         self.sim, self.heating = sim, heating
         self.observation, self.action, self.options = observation, commands, options
         self.observation_space, self.action_space = observation.space, commands.space
@@ -284,7 +282,7 @@ class SimulatedTask(gym.Env[Observation, Action], ABC):
         self._varied: dict[str, float] = asdict(self.variation)
         self._used = 0.0
         own, asked = type(self).control_period, control_period
-        self.control_period = own if asked is None else number("control_period", asked, above=0.0)
+        self.control_period = own if asked is None else asked
         self.interval = own if _times(own, self.control_period) else sim.tca_period
         self.repeats = _times(self.interval, self.control_period)
         if not self.repeats:
@@ -383,16 +381,41 @@ class SimulatedTask(gym.Env[Observation, Action], ABC):
         """Starts an episode; ``self.options`` is the table of the options.
 
         Raises:
-            ValueError: If an option is unknown or out of its range.
+            ValueError: If an option is unknown or out of its range, or no seed a seed; or if the
+                robot does not come to rest with them.
         """
-        super().reset(seed=seed)
-        setup = self.options.setup(self.np_random, options or {})
+        super().reset(seed=None if seed is None else whole("seed", seed, at_least=0))
+        setup = self.options.setup(self.np_random, {} if options is None else options)
         variation = variation_of(setup)
         self._nominal.apply(variation)
         self._varied = asdict(variation)
-        self.prepare(setup)
+        try:
+            self.prepare(setup)
+        except SimulationDiverged as error:
+            raise ValueError(
+                f"options must leave a robot that comes to rest, got {self._varied}: {error}"
+            ) from error
         self._used = self.energy
         return self.seen(), self._info(success=False)
+
+    def _try(self, name: str, robot: Any) -> None:
+        """Refuses a robot that was given, not None, if it does not get through its first step.
+
+        To be called by ``__init__`` at its end.
+        """
+        if robot is None:
+            return
+        try:
+            outside = self.observation.outside(self.reset(seed=0)[0])
+            why = f"{outside} out of bounds" if outside else None
+            why = why or self.step(self.action.still)[4].get("truncation_reason")
+        except ValueError as error:
+            why = str(error)
+        if why:
+            raise ValueError(
+                f"{name} must be one that gets through its first step, got {shown(robot)}: {why}"
+            )
+        self._np_random = self._np_random_seed = None  # nothing was drawn yet
 
     def finish(self, drive: Drive, error: SimulationDiverged | None) -> Outcome:
         """What the step has led to; see the class.
@@ -427,12 +450,15 @@ class SimulatedTask(gym.Env[Observation, Action], ABC):
                 terms["end"] = -self.end_price
         used, self._used = self._used, self.energy
         terms["energy"] = -self.energy_price * (self._used - used)
-        info = {"reward_terms": terms, "cost": cost + (reason is not None)}
+        info: dict[str, Any] = {"reward_terms": terms, "cost": cost + (reason is not None)}
         info |= self._info(success=success)
         if reason is not None:
             info["truncation_reason"] = reason
         if ended is not None:
             info["termination_reason"] = ended
+        if error is not None or outside:
+            info = _finite(info)
+            terms = info["reward_terms"]
         terminated, truncated = success or ended is not None, reason is not None
         return observation, float(sum(terms.values())), terminated, truncated, info
 
@@ -595,23 +621,33 @@ def together(before: Outcome | None, now: Outcome) -> Outcome:
     return observation, float(sum(terms.values())), terminated, truncated, info
 
 
-def parts(name: str, whole: float, part: float, *, of: int = 1) -> int:
-    """How many times ``part`` makes up a time ``whole``, a multiple of ``of``.
+def _finite(info: dict[str, Any]) -> dict[str, Any]:
+    """An info in which what is not finite is 0."""
+    return {
+        key: _finite(value) if isinstance(value, dict)
+        else np.nan_to_num(value, posinf=0.0, neginf=0.0) if np.asarray(value).dtype.kind == "f"
+        else value
+        for key, value in info.items()
+    }  # fmt: skip
+
+
+def parts(name: str, time: float, part: float, *, of: int = 1) -> int:
+    """How many times ``part`` makes up a time, a multiple of ``of``.
 
     Raises:
         ValueError: If it is no such number; ``name`` is what ``part`` is called.
     """
-    count = _times(part, whole)
+    count = _times(quantity(name, part, above=0.0), time)
     if not count or count % of:
         number = f"multiple of {of}" if of > 1 else "whole number"
-        raise ValueError(f"{name} must be {whole} s over a {number}, got {part}")
+        raise ValueError(f"{name} must be {time} s over a {number}, got {part}")
     return count
 
 
-def _times(part: float, whole: float) -> int:
+def _times(part: float, time: float) -> int:
     """How many times a time makes up another; 0 if that is no whole number."""
-    count = round(whole / part) if np.isfinite(part) and part > 0.0 else 0
-    return count if abs(count * part - whole) < 1e-9 else 0
+    count = round(time / part)
+    return count if abs(count * part - time) < 1e-9 else 0
 
 
 def broken_off(error: SimulationDiverged | None) -> str | None:

@@ -11,13 +11,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tca_mj.assets import mjcf
+from tca_mj.checks import door, require_one_of
 from tca_mj.envs.options import Constant, Option, Options, Setup, Uniform, variation_options
 from tca_mj.envs.stance import CAMERAS, LEG_TCAS, Stance, tetrapod_scene
 from tca_mj.envs.table import Entry, Table
 from tca_mj.envs.task import Headway, SimulatedTask, TaskArguments, TaskState, Verdict, parts
 from tca_mj.envs.vector import TaskVector
 from tca_mj.robots.tetrapod import LEGS, TetrapodSpec
-from tca_mj.sim import Drive
+from tca_mj.sim import Drive, Timestep
 
 _SIDES = (4, 5, 6, 1, 2, 3, 10, 11, 12, 7, 8, 9)  # TCAs of the legs, left and right swapped
 _FEET = (4, -5, 6, 1, -2, 3, 10, -11, 12, 7, -8, 9)  # and the places of their feet
@@ -148,13 +149,14 @@ class TetrapodGait(SimulatedTask):
     learning_options = {"randomise": 0.2}
     bend_range: ClassVar[float] = math.radians(1.0)  # largest deviation of the body's bend [rad]
 
+    @door
     def __init__(
         self,
         *,
         gait: str = "walk",
         robot: TetrapodSpec | None = None,
         body: str = "rigid",
-        timestep: float = 6.25e-3,
+        timestep: Timestep = 6.25e-3,
         **common: Unpack[TaskArguments],
     ) -> None:
         """Builds the scene.
@@ -171,9 +173,7 @@ class TetrapodGait(SimulatedTask):
         Raises:
             ValueError: If an argument is unknown or out of range, or the robot cannot be built.
         """
-        if gait not in TASKS:
-            raise ValueError(f"gait must be one of {list(TASKS)}, got {gait!r}")
-        self.gait = gait
+        self.gait = require_one_of("gait", gait, list(TASKS))
         self.task = TASKS[gait]
         self.robot = robot or TetrapodSpec()
         objects = {} if self.task.beam is None else {"beam": mjcf("beam.xml")}
@@ -198,6 +198,7 @@ class TetrapodGait(SimulatedTask):
         self._along, self._aside = 0.0, 0.0
         self._bend = self.task.bend
         self._progress = self._measure()
+        self._try("robot", robot)
 
     def _options(self) -> Options:
         task = self.task

@@ -12,7 +12,7 @@ import os
 from collections.abc import Callable, Mapping, Sequence
 from copy import deepcopy
 from functools import partial
-from typing import Any
+from typing import Annotated, Any
 
 import gymnasium as gym
 import numpy as np
@@ -23,12 +23,17 @@ from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
 from tca_mj.batch import SimulationBatch
-from tca_mj.checks import text, whole
+from tca_mj.checks import Count, door, instance, require_one_of, shown, text, whole
 from tca_mj.envs.table import commands
 from tca_mj.envs.task import Observation, Outcome, SimulatedTask, together
+from tca_mj.registry import EpisodeSteps
 
 Options = Mapping[str, Any] | None
 Flags = NDArray[np.bool_]
+MOST_ENVS = 1024
+"""Most tasks of one vector environment: as many of the largest robot take 5 GB of memory."""
+Tasks = Annotated[int, partial(whole, at_least=1, at_most=MOST_ENVS)]
+_MODES = [mode.value for mode in AutoresetMode]
 
 
 class TaskVector(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[Any]]):
@@ -47,13 +52,14 @@ class TaskVector(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[Any
             new episode by themselves; for example ``{"randomise": 0.2}``.
     """
 
+    @door
     def __init__(
         self,
         task: Callable[..., SimulatedTask],
         *,
-        num_envs: int = 1,
-        num_threads: int | None = None,
-        max_episode_steps: int | None = None,
+        num_envs: Tasks = 1,
+        num_threads: Count | None = None,
+        max_episode_steps: EpisodeSteps | None = None,
         autoreset_mode: AutoresetMode | str = AutoresetMode.SAME_STEP,
         reset_options: Options = None,
         **kwargs: Any,
@@ -62,7 +68,7 @@ class TaskVector(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[Any
 
         Args:
             task: Its class.
-            num_envs: Number of tasks.
+            num_envs: Number of tasks, 1 to 1024.
             num_threads: Threads of the simulations; None for one for each core that this process
                 may use. There are never more than tasks.
             max_episode_steps: Steps after which an episode is truncated; None for no limit.
@@ -71,16 +77,12 @@ class TaskVector(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[Any
             **kwargs: Arguments of the task.
 
         Raises:
-            ValueError: If a number is below 1, the mode is unknown or the task cannot be built.
+            ValueError: If a number is out of bounds, the mode is unknown or the task cannot be
+                built.
         """
         cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
         threads = (cores or 1) if num_threads is None else num_threads
-        for name, value in (
-            ("num_envs", num_envs), ("num_threads", threads),
-            ("max_episode_steps", 1 if max_episode_steps is None else max_episode_steps),
-        ):  # fmt: skip
-            if value < 1:
-                raise ValueError(f"{name} must be at least 1, got {value}")
+        require_one_of("autoreset_mode", getattr(autoreset_mode, "value", autoreset_mode), _MODES)
         first = task(**kwargs)
         self.envs: list[SimulatedTask] = [first, *(deepcopy(first) for _ in range(num_envs - 1))]
         self.num_envs = num_envs
@@ -119,7 +121,9 @@ class TaskVector(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[Any
             ClosedEnvironmentError: If the environment is closed.
         """
         self._must_be_open()
+        whole("i", i, at_least=0, at_most=self.num_envs - 1)
         given = self.reset_options if options is None else options
+        instance("options", given, Mapping | None)
         begun = self.envs[i].reset(seed=seed, options=None if given is None else dict(given))
         self._elapsed[i], self._over[i] = 0, False
         return begun
@@ -144,6 +148,8 @@ class TaskVector(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[Any
         self._must_be_open()
         told = commands("actions", actions, self.action_space.shape or ())
         stepped = np.ones(self.num_envs, dtype=bool) if which is None else which
+        if getattr(stepped, "dtype", None) != np.bool_ or stepped.shape != (self.num_envs,):
+            raise ValueError(f"which must be {self.num_envs} booleans in one array, got {which!r}")
         if (self._elapsed[stepped] < 0).any():
             raise ResetNeeded("the tasks must be reset before the first step")
         batch, first, going = self.batch, self.envs[0], stepped.copy()
@@ -189,9 +195,9 @@ class TaskVector(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[Any
             ValueError: If there are too few seeds or options, or as the tasks' ``reset``.
             TypeError: If ``reset_mask`` is no array of booleans.
         """
-        seeds = self._each("seed", seed)
         if isinstance(seed, int | np.integer):
-            seeds = [int(seed) + i for i in range(self.num_envs)]
+            seed = [whole("seed", seed, at_least=0) + i for i in range(self.num_envs)]
+        seeds = self._each("seed", seed)
         mask = np.ones(self.num_envs, dtype=bool)
         if isinstance(options, Mapping) and "reset_mask" in options:
             mask = _mask(options["reset_mask"], self.num_envs)
@@ -265,12 +271,11 @@ class TaskVector(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[Any
 
     def _each(self, name: str, values: Any) -> list[Any]:
         """One value for each task."""
-        if values is None or isinstance(values, Mapping | int | np.integer):
+        if values is None or isinstance(values, Mapping):
             return [values] * self.num_envs
-        values = list(values)
-        if len(values) != self.num_envs:
-            raise ValueError(f"{name} must be {self.num_envs}, got {len(values)}")
-        return values
+        if not isinstance(values, Sequence | np.ndarray) or len(values) != self.num_envs:
+            raise ValueError(f"{name} must be {self.num_envs} of them, got {shown(values)}")
+        return list(values)
 
     def render(self) -> tuple[Any, ...]:
         """The picture of each task, as its ``render``; errors as ``advance``."""
@@ -325,9 +330,9 @@ class TaskVector(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[Any
 
 def _mask(mask: Any, size: int) -> Flags:
     if not isinstance(mask, np.ndarray) or mask.dtype != np.bool_:
-        raise TypeError(f"reset_mask must be an array of booleans, got {mask!r}")
+        raise TypeError(f"reset_mask must be an array of booleans, got {shown(mask)}")
     if mask.shape != (size,) or not mask.any():
-        raise ValueError(f"reset_mask must have shape ({size},) and name a task, got {mask}")
+        raise ValueError(f"reset_mask must have shape ({size},) and name a task, got {shown(mask)}")
     return mask
 
 

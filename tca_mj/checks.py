@@ -72,7 +72,9 @@ def floats(name: str, values: ArrayLike, *, empty: bool = False) -> Array:
         masked = np.ma.isMaskedArray(values)
         if array.dtype.kind not in "iuf" or masked or (listed and not array.size and not empty):
             raise TypeError
-        with np.errstate(over="ignore"):
+        if array.dtype.itemsize <= 8:
+            return array.astype(np.float64)
+        with np.errstate(over="ignore"):  # long doubles
             return array.astype(np.float64)
     except (OverflowError, TypeError, ValueError) as error:
         raise ValueError(
@@ -309,7 +311,12 @@ def door(function: Callable[P, R]) -> Callable[P, R]:
     @wraps(function)
     def entered(*args: P.args, **kwargs: P.kwargs) -> R:
         signature, checks = _arguments(function)
-        bound = signature.bind(*args, **kwargs)
+        try:
+            bound = signature.bind(*args, **kwargs)
+        except TypeError:
+            bound = None
+        if bound is None:  # Python says what is missing or too many
+            return function(*args, **kwargs)
         given = bound.arguments
         for name, check in checks:
             if name in given:

@@ -2,22 +2,31 @@
 
 The tasks live in ``tca_mj.envs``, the last layer but one, and yet ``import tca_mj`` has to make
 their ids known. So this file names them as strings, which Gymnasium resolves in ``gymnasium.make``,
-and imports nothing but Gymnasium itself.
+and imports nothing but Gymnasium itself and what checks arguments.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from importlib import import_module
-from typing import Any
+from typing import Annotated, Any
 
 import gymnasium
 from gymnasium.envs.registration import EnvSpec, load_env_creator
 
+from tca_mj.checks import Checked, door, number, shown, whole
+
+ControlPeriod = Annotated[float, partial(number, above=0.0, at_most=60.0, unit="s")]
+"""Time of a step of a task: in a minute each of these robots has come to rest."""
+MOST_EPISODE = 10_000_000
+"""Most steps of an episode, 11 days of the shortest control period in use, 0.1 s."""
+EpisodeSteps = Annotated[int, partial(whole, at_least=1, at_most=MOST_EPISODE)]
+
 
 @dataclass(frozen=True, kw_only=True, slots=True)
-class Task:
+class Task(Checked):
     """What Gymnasium has to know of a task before its code is loaded.
 
     Attributes:
@@ -30,7 +39,7 @@ class Task:
 
     id: str
     entry_point: str
-    max_episode_steps: int
+    max_episode_steps: EpisodeSteps
     kwargs: Mapping[str, Any] = field(default_factory=dict)
     demo: str = ""
 
@@ -92,6 +101,7 @@ def register() -> None:
 DEMOS = {task.demo: task.id for task in TASKS if task.demo}
 
 
+@door
 def find_task(task: str) -> EnvSpec:
     """What Gymnasium knows of a task.
 
@@ -109,10 +119,11 @@ def find_task(task: str) -> EnvSpec:
     except (ImportError, gymnasium.error.Error) as error:
         known = [known.id for known in TASKS]
         raise ValueError(
-            f"task must be one of {known}, or module:id of another, got {task!r}: {error}"
+            f"task must be one of {known}, or module:id of another, got {shown(task)}: {error}"
         ) from error
 
 
+@door
 def task_class(task: str) -> Any:
     """The class of a task, a ``tca_mj.envs.task.SimulatedTask``.
 
@@ -129,7 +140,8 @@ def task_class(task: str) -> Any:
     return found
 
 
-def episode_steps(task: str, control_period: float | None = None) -> int | None:
+@door
+def episode_steps(task: str, control_period: ControlPeriod | None = None) -> int | None:
     """Steps of an episode of a task's own length; None if it has no limit.
 
     Args:
@@ -147,7 +159,8 @@ def episode_steps(task: str, control_period: float | None = None) -> int | None:
     return max(1, round(steps * own / control_period))
 
 
-def make(task: str, *, max_episode_steps: int | None = None, **arguments: Any) -> Any:
+@door
+def make(task: str, *, max_episode_steps: EpisodeSteps | None = None, **arguments: Any) -> Any:
     """``gymnasium.make``, where an episode takes as long as the task's own at any control period.
 
     Args:

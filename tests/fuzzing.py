@@ -239,7 +239,9 @@ BY_SURFACE: dict[str, dict[str, Any]] = {
     "sim.Simulation.step": {"command": [0.1] * 3},
     "sim.Simulation.checked": {"command": [0.1] * 3, "voltage": 0.0, "fan": False},
     "smp.heater.fan_gain": {"start": 120.0},
-    "tca.fibre.centreline.Centreline.of_curve": {"position": lambda: _spiral, "end": 6.0, "start": 0.0},
+    "tca.fibre.centreline.Centreline.of_curve": {
+        "position": lambda: _spiral, "end": 6.0, "start": 0.0,
+    },
     "tca.fibre.centreline.Centreline.of_points": {"points": lambda: _spiral(np.linspace(0, 6, 50))},
     "tca.laws.creep.CreepBank.fresh": {"length": [0.05]},
     "tca.sensing.wire.fit_displacement": {
@@ -477,7 +479,8 @@ def _samples() -> dict[Any, Callable[[], Any]]:
         tca.Supply: tca.Supply,
         Polynomial: lambda: Polynomial([0.0, 1.0]),
         np.random.Generator: lambda: np.random.default_rng(0),
-        BeamSpec: lambda: beam, Helix: lambda: Helix(3e-3), UTurn: lambda: UTurn.parallel(3e-3, 1e-3),
+        BeamSpec: lambda: beam, Helix: lambda: Helix(3e-3),
+        UTurn: lambda: UTurn.parallel(3e-3, 1e-3),
         Route: lambda: Helix(3e-3), Segment: lambda: Segment(beam, [Helix(3e-3)], [0.05]),
         Part: bending_module, Chain: chain, Pass: lambda: Pass(chain(), Helix(3e-3)),
         RoutedTca: lambda: bending_module().tcas[0],
@@ -506,8 +509,11 @@ def _samples() -> dict[Any, Callable[[], Any]]:
             task="TCA/BendReach-v0", algorithm="sac", learner=OffPolicy(), steps=2
         ),
         OffPolicy: OffPolicy, variation.Nominal: lambda: variation.Nominal(bent()),
-        smp.Damage: lambda: smp.Damage(*[np.zeros(1, bool)] * 3), Outline: lambda: Outline(4e-3, 4e-3),
-        Option: lambda: Option(name="x", about="", draw=lambda *_: 0.5, drawn="", low=0.0, high=1.0),
+        smp.Damage: lambda: smp.Damage(*[np.zeros(1, bool)] * 3),
+        Outline: lambda: Outline(4e-3, 4e-3),
+        Option: lambda: Option(
+            name="x", about="", draw=lambda *_: 0.5, drawn="", low=0.0, high=1.0
+        ),
         Options: lambda: env().unwrapped.options, Watched: bent, Recorded: bent,
         Recorder: lambda: Recorder(bent(), "sample.rrd"), Film: lambda: Film(bent(), "sample.mp4"),
         Closing: lambda: Film(bent(), "sample.mp4"),
@@ -541,7 +547,8 @@ HOSTILE: dict[str, Callable[[], Any]] = {
     "nan array": lambda: np.array([math.nan]), "wrong shape": lambda: np.full((2, 3, 4), 0.05),
     "many axes": lambda: np.full((1,) * 12, 0.05), "ragged": lambda: [[0.05], [0.05, 0.06]],
     "texts": lambda: ["x", "y"], "objects": lambda: np.array([None, "x"], dtype=object),
-    "set": lambda: {0.05}, "mixed": lambda: [0.05, "x"], "function": lambda: len, "class": lambda: int,
+    "set": lambda: {0.05}, "mixed": lambda: [0.05, "x"], "function": lambda: len,
+    "class": lambda: int,
     "a TCA": lambda: good(tca_mj.TcaSpec), "a beam": lambda: good(tca_mj.BeamSpec),
     "a route": lambda: good(tca_mj.Helix), "an arm": lambda: tca_mj.ArmSpec(),
     "a fibre": lambda: good(tca_mj.TcaSpec).fibre, "path": lambda: Path("nowhere"),

@@ -177,16 +177,16 @@ def test_draws_fill_their_ranges(shared):
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"object": "hammer"}, r"object must be one of \['pcb', 'screwdriver'\], got 'hammer'"),
+        ({"object": "hammer"}, r"object must be one of \('pcb', 'screwdriver'\), got 'hammer'"),
         ({"weight": 1.0}, r"options must be some of .*, got \['weight'\]"),
         ({"object_position": (6e-3, 0.0)}, r"object_position must be between -0\.005 and 0\.005 m"),
         ({"object_position": (0.0,)}, r"object_position must be finite numbers of shape \(2,\)"),
-        ({"object_position": (math.nan, 0.0)}, "object_position must be finite numbers of shape"),
+        ({"object_position": (math.nan, 0.0)}, "object_position must be finite"),
         ({"object_yaw": 0.0}, r"object_yaw must be between .* rad, got 0\.0"),
-        ({"object_yaw": math.nan}, "object_yaw must be finite numbers of shape .* got nan"),
+        ({"object_yaw": math.nan}, "object_yaw must be finite, got nan"),
         ({"cup_position": (0.0, 0.0)}, r"cup_position must be .* m from 0, got .*0\.0000 m"),
         ({"cup_position": (1.0, 0.0, 0.0)}, "cup_position must be finite numbers of shape"),
-        ({"cup_position": (0.0, math.inf)}, "cup_position must be finite numbers of shape"),
+        ({"cup_position": (0.0, math.inf)}, "cup_position must be finite"),
     ],
 )
 def test_bad_options_are_refused(shared, options, message):
@@ -197,9 +197,9 @@ def test_bad_options_are_refused(shared, options, message):
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"render_mode": "human"}, "render_mode must be None or one of .* got 'human'"),
+        ({"render_mode": "human"}, "render_mode must be one of .None, .* got 'human'"),
         ({"timestep": 3e-3}, "timestep must be 0.1 s over a multiple of 5, got 0.003"),
-        ({"timestep": 0.0}, "timestep must be 0.1 s over a multiple of 5, got 0.0"),
+        ({"timestep": 0.0}, "timestep must be finite and at least 1e-06"),
     ],
 )
 def test_bad_arguments_are_refused(options, message):

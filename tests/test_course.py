@@ -131,10 +131,10 @@ def test_an_action_is_power_and_voltage(shared):
     ("options", "message"),
     [
         ({"height": 1.0}, "options"),
-        ({"friction": 0.0}, "friction must be finite and above 0"),
+        ({"friction": 0.0}, "friction must be between 0.01 and 10, got 0"),
         ({"randomise": 0.6}, "randomise"),
         ({"randomise": -0.1}, "randomise must be between 0 and 0.5"),
-        ({"mass": 0.0}, "mass must be finite and above 0"),
+        ({"mass": 0.0}, "mass must be between 0.05 and 10, got 0"),
         ({"position": [0.1, 0.0]}, "position"),
         ({"yaw": "left"}, "yaw"),
     ],

@@ -258,9 +258,9 @@ def test_options_do_not_shift_the_other_draws(shared):
     [
         ({"weight": 1.0}, r"options must be some of \['ambient', .*'weight'\]"),
         ({"target": (0.0, 0.0)}, r"target must be finite numbers of shape \(3,\)"),
-        ({"target": (0.0, 0.0, math.nan)}, r"target must be finite numbers of shape \(3,\)"),
+        ({"target": (0.0, 0.0, math.nan)}, r"target must be finite"),
         ({"randomise": 0.6}, r"randomise must be between 0 and 0\.5, got 0\.6"),
-        ({"mass": 0.0}, r"mass must be finite and above 0, got 0\.0"),
+        ({"mass": 0.0}, r"mass must be between 0\.05 and 10, got 0\.0"),
     ],
 )
 def test_bad_options_are_refused(shared, options, message):
@@ -271,11 +271,11 @@ def test_bad_options_are_refused(shared, options, message):
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"render_mode": "human"}, "render_mode must be None or one of .* got 'human'"),
-        ({"camera": "close"}, r"camera must be one of \['front', 'side'\], got 'close'"),
-        ({"size": (0, 10)}, r"size must be at least 1 pixel each way, got \(0, 10\)"),
+        ({"render_mode": "human"}, "render_mode must be one of .None, .* got 'human'"),
+        ({"camera": "close"}, r"camera must be one of .None, .front., .side.., got 'close'"),
+        ({"size": (0, 10)}, r"size\[0\] must be at least 1, got 0"),
         ({"timestep": 3e-3}, "tca_period must be a positive multiple of timestep 0.003"),
-        ({"module_spec": BendingSpec(count=4)}, "module_spec must have 3 TCAs, got 4"),
+        ({"module_spec": BendingSpec(count=4)}, "module_spec.count must be one of .3,., got 4"),
     ],
 )
 def test_bad_arguments_are_refused(options, message):

@@ -277,14 +277,14 @@ def test_draws_fill_their_ranges(walker):
     [
         ({"weight": 1.0}, r"options must be some of .*, got \['weight'\]"),
         ({"direction": 4.0}, r"direction must be between -3\.14159 and 3\.14159 rad, got 4\.0"),
-        ({"direction": math.nan}, r"direction must be finite numbers of shape \(\), got nan"),
+        ({"direction": math.nan}, r"direction must be finite, got nan"),
         ({"yaw": 0.2}, r"yaw must be between -0\.05 and 0\.05 rad, got 0\.2"),
         ({"bend": 1.0}, r"bend must be between .* got 1\.0"),
         ({"randomise": 0.6}, r"randomise must be between 0 and 0\.5, got 0\.6"),
         ({"randomise": -0.1}, r"randomise must be between .* got -0\.1"),
-        ({"friction": 0.0}, r"friction must be finite and above 0, got 0\.0"),
-        ({"mass": (1.0, 2.0)}, r"mass must be finite numbers of shape \(\)"),
-        ({"ambient": "warm"}, r"ambient must be finite numbers of shape \(\)"),
+        ({"friction": 0.0}, r"friction must be between 0.01 and 10, got 0"),
+        ({"mass": (1.0, 2.0)}, r"mass must be one finite number"),
+        ({"ambient": "warm"}, r"ambient must be a real number"),
     ],
 )
 def test_bad_options_are_refused(walker, options, message):
@@ -303,10 +303,10 @@ def test_a_beam_has_two_directions(envs):
     ("arguments", "message"),
     [
         ({"gait": "gallop"}, r"gait must be one of \['crawl', 'walk', 'shimmy'\], got 'gallop'"),
-        ({"render_mode": "human"}, "render_mode must be None or one of .* got 'human'"),
+        ({"render_mode": "human"}, "render_mode must be one of .None, .* got 'human'"),
         ({"camera": "back"}, "camera must be one of .* got 'back'"),
         ({"body": "soft"}, r"body must be one of \['rigid', 'elastic', 'fine'\], got 'soft'"),
-        ({"size": (0, 10)}, r"size must be at least 1 pixel each way, got \(0, 10\)"),
+        ({"size": (0, 10)}, r"size\[0\] must be at least 1, got 0"),
         ({"timestep": 3e-3}, r"timestep must be 0\.1 s over a whole number, got 0\.003"),
     ],
 )

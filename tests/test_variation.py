@@ -156,11 +156,26 @@ def test_draws_are_scaled_by_the_spread():
 @pytest.mark.parametrize(
     ("figures", "message"),
     [
-        ({"friction": 0.0}, "friction must be finite and at least 0.01 and at most 10, got 0.0"),
-        ({"mass": -1.0}, "mass must be finite and at least 0.05 and at most 10, got -1.0"),
-        ({"tca_gain": math.nan}, "tca_gain must be finite and at least 0.05 and at most 5, got nan"),
-        ({"heat_loss": math.inf}, "heat_loss must be finite and at least 0.05 and at most 10, got inf"),
-        ({"ambient": -300.0}, "ambient must be finite and at least -40 and at most 60 °C, got -300.0"),
+        (
+            {"friction": 0.0},
+            "friction must be finite and at least 0.01 and at most 10, got 0.0",
+        ),
+        (
+            {"mass": -1.0},
+            "mass must be finite and at least 0.05 and at most 10, got -1.0",
+        ),
+        (
+            {"tca_gain": math.nan},
+            "tca_gain must be finite and at least 0.05 and at most 5, got nan",
+        ),
+        (
+            {"heat_loss": math.inf},
+            "heat_loss must be finite and at least 0.05 and at most 10, got inf",
+        ),
+        (
+            {"ambient": -300.0},
+            "ambient must be finite and at least -40 and at most 60 °C, got -300.0",
+        ),
     ],
 )
 def test_impossible_variations_are_refused(figures, message):

@@ -9,14 +9,14 @@ from typing import Annotated
 
 import mujoco
 
-from tca_mj.checks import Checked, Finite, Positive, door, number
+from tca_mj.checks import Checked, Finite, Positive, door, number, whole
 from tca_mj.hints import Length, Mass, Section
 from tca_mj.model.build import add_tca
 from tca_mj.model.chain import Chain, Motion, Nodes, add_chain
 from tca_mj.model.part import Part, new_spec
 from tca_mj.model.surface import TOUCHES_NOTHING, surface
 from tca_mj.rod.beam import BeamSpec, Outline
-from tca_mj.routes import Helix, TcaCount
+from tca_mj.routes import Helix
 from tca_mj.tca import CATALOGUE, TcaSpec
 
 CARBON_YOUNG = 130e9  # pultruded carbon-fibre rod along its fibres; estimate from data sheets [Pa]
@@ -38,7 +38,7 @@ class LegSpec(Checked):
             bear the robot, 0.12 N; that of 0.4 mm is 0.13 N, that of 0.5 mm 0.33 N.
         offset: Distance of the TCAs from the rod [m]. Estimate.
         phase: Angle of the first TCA from the leg's x axis [rad].
-        count: Number of TCAs, at equal angles from ``phase`` on.
+        count: Number of TCAs, at equal angles from ``phase`` on, 2 to 100.
         plate_radius: Radius of the plates [m]. Estimate.
         plate_thickness: Thickness of the plates [m]. Estimate.
         plate_fill: Share of a plate's disc that is not cut out. Estimate.
@@ -65,7 +65,7 @@ class LegSpec(Checked):
     rod_diameter: Section = 0.5e-3
     offset: Section = 8e-3
     phase: Finite = 0.0
-    count: TcaCount = 3
+    count: Annotated[int, partial(whole, at_least=2, at_most=100)] = 3
     plate_radius: Section = 9e-3
     plate_thickness: Section = 1e-3
     plate_fill: Annotated[float, partial(number, above=0.0, at_most=1.0)] = 0.5

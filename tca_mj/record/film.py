@@ -6,15 +6,20 @@ They need imageio and imageio-ffmpeg, which are loaded when the first one is beg
 from __future__ import annotations
 
 import importlib
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import mujoco
 
-from tca_mj.checks import require_count, require_positive
+from tca_mj.checks import door, number, shown
 from tca_mj.files import Claim
 from tca_mj.machine import how_to_install
-from tca_mj.record.render import Closing, Offscreen, Watched, colour_tendons
+from tca_mj.record.render import Closing, Offscreen, Pixels, Watched, colour_tendons
+
+# A player shows no more; and the slowest film shows each step, the fastest an hour in a second.
+_Fps = Annotated[float, partial(number, at_least=1.0, at_most=240.0)]
+_Speed = Annotated[float, partial(number, at_least=1e-3, at_most=3600.0)]
 
 
 class Film(Closing):
@@ -24,32 +29,31 @@ class Film(Closing):
     written by one film at a time; one that has been finished is overwritten by the first frame.
     """
 
+    @door
     def __init__(
-        self, simulation: Watched, path: str | Path, *, fps: float = 30.0, speed: float = 1.0,
-        width: int = 960, height: int = 720, camera: int | str | mujoco.MjvCamera = -1,
+        self, simulation: Watched, path: str | Path, *, fps: _Fps = 30.0, speed: _Speed = 1.0,
+        width: Pixels = 960, height: Pixels = 720, camera: int | str | mujoco.MjvCamera = -1,
     ) -> None:  # fmt: skip
         """Prepares the file; OpenGL is set up by the first frame.
 
         Args:
             simulation: What to film.
             path: File to write, ending ``.mp4``; its folder is made if it is missing.
-            fps: Frames per second of the film [1/s].
-            speed: Simulated seconds per second of film [1].
-            width: Width, a multiple of 16 [pixels].
-            height: Height, a multiple of 16 [pixels].
+            fps: Frames per second of the film, 1 to 240 [1/s].
+            speed: Simulated seconds per second of film, 0.001 to 3600 [1].
+            width: Width, a multiple of 16 up to 8192 [pixels].
+            height: Height, a multiple of 16 up to 8192 [pixels].
             camera: As in ``Offscreen``.
 
         Raises:
             ImportError: If imageio, imageio-ffmpeg or its encoder is not installed.
             ValueError: If a number is out of range.
         """
-        require_positive(fps=fps, speed=speed)
-        require_count(width=width, height=height)
         if width % 16 or height % 16:
             raise ValueError(f"size must be multiples of 16 pixels, got {width} x {height}")
         self.simulation, self.path = simulation, Path(path)
         if self.path.suffix != ".mp4":
-            raise ValueError(f"path must end in .mp4, got {self.path}")
+            raise ValueError(f"path must end in .mp4, got {shown(path)}")
         self._imageio = _imageio()
         self._writer: Any = None
         self._claim: Claim | None = None

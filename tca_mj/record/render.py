@@ -19,15 +19,18 @@ import subprocess
 import sys
 import threading
 import weakref
-from typing import Any, Protocol, Self
+from typing import Annotated, Any, Protocol, Self
 
 import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tca_mj.checks import require_count
+from tca_mj.checks import door, whole
 from tca_mj.forks import Held, keep_for_ever
 from tca_mj.record.plots import temperature_colour
+
+Pixels = Annotated[int, functools.partial(whole, at_least=1, at_most=8192)]
+"""Width or height of a picture: twice that of a large screen, in every OpenGL's reach."""
 
 _PROBE = """
 import importlib, sys
@@ -167,26 +170,26 @@ class Offscreen(Closing, Held):
     off, is refused; closed there, the memory is given back when the program ends.
     """
 
+    @door
     def __init__(
-        self, model: mujoco.MjModel, *, width: int = 960, height: int = 720,
+        self, model: mujoco.MjModel, *, width: Pixels = 960, height: Pixels = 720,
         camera: int | str | mujoco.MjvCamera = -1,
     ) -> None:  # fmt: skip
         """Sets up OpenGL.
 
         Args:
             model: Model to draw.
-            width: Width of the pictures [pixels].
-            height: Height of the pictures [pixels].
+            width: Width of the pictures, 1 to 8192 [pixels].
+            height: Height of the pictures, 1 to 8192 [pixels].
             camera: Id or name of a camera of the model, a camera of one's own, or -1 for the
                 model's overview.
 
         Raises:
             RenderingUnavailable: If OpenGL cannot be had.
-            ValueError: If the size is not positive or the camera does not exist.
+            ValueError: If the size is out of bounds or the camera does not exist.
         """
         Held.__init__(self)
         self._thread = threading.current_thread()
-        require_count(width=width, height=height)
         self.camera = _camera(model, camera)
         self.model = model
         self._rectangle = mujoco.MjrRect(0, 0, width, height)

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tca_mj.checks import Array, Numbers, door
+from tca_mj.checks import Array, Numbers, door, number
 from tca_mj.smp.damage import Damage, DamageSpec, flag_damage, soft_bending_rate
 from tca_mj.smp.fixing import SpineState, advance, spring
 from tca_mj.smp.heater import HeaterSpec, HeaterState, heat_spine
@@ -35,8 +35,12 @@ def in_tube(tca: TcaSpec, touching: float = 0.0) -> TcaSpec:
         tca: The kind of TCA.
         touching: Share of its circumference that touches the tube, 0 to 1. Estimate: it lies
             loosely there, as it shrinks into the tube in its training (Sun, Section 6.1.1).
+
+    Raises:
+        ValueError: If the TCA is as thick as the tube or more, or the share is none.
     """
     radius = 0.5 * TUBE_DIAMETER
+    number("tca.outer_radius", tca.outer_radius, below=radius, unit="m, of the tube")
     section, perimeter = math.pi * (radius**2 - tca.outer_radius**2), 2.0 * math.pi * radius
     return in_silicone(tca, section=section, perimeter=perimeter, touching=touching)
 
