@@ -12,7 +12,16 @@ from gymnasium.spaces import Box
 from numpy.typing import ArrayLike, NDArray
 
 from tca_mj.checks import (
-    Checked, Edge, Finite, Positive, door, every, instance, shown, whole, within,
+    Checked,
+    Edge,
+    Finite,
+    Positive,
+    door,
+    every,
+    instance,
+    shown,
+    whole,
+    within,
 )  # fmt: skip
 
 _Size = Annotated[int, partial(whole, at_least=1, at_most=10_000)]  # as long as a picture is wide

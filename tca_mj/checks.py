@@ -131,7 +131,7 @@ def within(
     bounds = {"above": above, "at least": at_least, "below": below, "at most": at_most}
     said = [f"{word} {bound:.6g}" for word, bound in bounds.items() if math.isfinite(bound)]
     tail = f" {unit}" if unit and said else ""
-    if math.isfinite(least) and math.isfinite(most) and max(most, -least) > LARGEST:
+    if np.isfinite(array).all() and np.abs(array).max() > LARGEST:
         said.append(f"at most {LARGEST:g} in size")
     must = " and ".join(["finite", *said])
     raise ValueError(f"{name} must be {must}{tail}, got {shown(values)}")
