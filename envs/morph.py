@@ -13,7 +13,6 @@ from numpy.typing import ArrayLike, NDArray
 from tca_mj.checks import door, some
 from tca_mj.envs.hanging import hang
 from tca_mj.envs.options import Option, Options, Setup, Uniform, variation_options
-from tca_mj.envs.rewards import tolerance
 from tca_mj.envs.table import Entry, Table
 from tca_mj.envs.task import SimulatedTask, TaskArguments, Verdict, parts
 from tca_mj.envs.vector import TaskVector
@@ -234,18 +233,15 @@ class MorphModule(SimulatedTask):
         """How far the task has got at an angle, by reward term."""
 
         def near(angle: float) -> float:
-            return tolerance(
-                abs(angle - self.target), bounds=(0.0, math.radians(1.0)), margin=math.pi,
-                sigmoid="linear", value_at_margin=0.0,
-            )  # fmt: skip
+            beyond = max(abs(angle - self.target) - _EXACT, 0.0)
+            return max(1.0 - beyond / math.pi, 0.0)
 
         self._keeps = self.fixed_angle
         return {"reach": near(angle), "fix": 4.0 * near(self._keeps)}
 
     def observe(self) -> dict[str, ArrayLike]:
         """See ``OBSERVATION``."""
-        sim = self.sim
-        self._bent = self.angle
+        sim, self._bent = self.sim, self.angle
         return {
             "spine temperature": sim.spines.temperature,
             "TCA temperature": sim.temperature,

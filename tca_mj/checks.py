@@ -218,6 +218,8 @@ def flags(name: str, values: ArrayLike) -> Flags:
     Raises:
         ValueError: If one of them is neither.
     """
+    if type(values) is bool:
+        return np.array(values)
     try:
         array = np.asarray(values)
     except ValueError:  # ragged

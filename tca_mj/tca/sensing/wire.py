@@ -36,6 +36,7 @@ from tca_mj.checks import (
     NotNegative,
     Numbers,
     door,
+    every,
     floats,
     instance,
     whole,
@@ -91,17 +92,17 @@ def resistance(
             resistance would be left, or if a temperature is not finite.
     """
     instance("wire", wire, WireTable)
-    if strict:
-        within("temperature", temperature)
-        within("length", length, above=0.0, unit="m")
     length = floats("length", length)
     with np.errstate(invalid="ignore"):
-        strain = length / wire.rest_length - 1.0
-        left = 1.0 - np.where(strain > 0.0, wire.stretch, wire.contraction) * strain
-    if strict:
-        within("share of resistance left at this length", left, above=0.0)
-    else:
-        left = np.where((length > 0.0) & (left > 0.0) & np.isfinite(temperature), left, np.nan)
+        short = 1.0 - length / wire.rest_length
+        left = np.where(short < 0.0, wire.stretch, wire.contraction) * short + 1.0
+    good = (length > 0.0) & (left > 0.0) & np.isfinite(temperature)
+    if not every(good):
+        if strict:
+            within("temperature", temperature)
+            within("length", length, above=0.0, unit="m")
+            within("share of resistance left at this length", left, above=0.0)
+        left = np.where(good, left, np.nan)
     return wire.rest_resistance * left
 
 
