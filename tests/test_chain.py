@@ -559,7 +559,7 @@ def test_parts_are_attached_by_name():
     [
         ({"tensions": [-0.1]}, r"tensions\[0\] must be finite and at least 0 N, got"),
         ({"tensions": [0.1, 0.1]}, "tensions must be one per route, 1, got 2"),
-        ({"tensions": [math.nan]}, r"tensions\[0\] must be finite and at least 0 N, got nan"),
+        ({"tensions": [math.nan]}, r"tensions\[0\] must be a number or a StrandLaw, got nan"),
         ({"tip_force": (0.0, 1.0)}, r"tip_force must be finite numbers of shape \(3,\)"),
         ({"tip_moment": (0.0, 1.0, math.inf)}, "tip_moment must be finite, got"),
         ({"gravity": 9.81}, r"gravity must be finite numbers of shape \(3,\), got 9\.81"),
