@@ -92,7 +92,7 @@ def resistance(
             resistance would be left, or if a temperature is not finite.
     """
     instance("wire", wire, WireTable)
-    length = floats("length", length)
+    temperature, length = floats("temperature", temperature), floats("length", length)
     with np.errstate(invalid="ignore"):
         short = 1.0 - length / wire.rest_length
         left = np.where(short < 0.0, wire.stretch, wire.contraction) * short + 1.0
