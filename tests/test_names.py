@@ -45,7 +45,7 @@ INTERNAL = {
     "tca_mj.certify": {"": "*"},
     "tca_mj.validation": {"": "*"},
     "tca_mj.envs": {
-        "options": "variation_of", "rewards": "*", "stance": "*",
+        "options": "variation_of", "rewards": "*", "stance": "*", "table": "commands",
         "task": "broken_off how_it_ended parts together",
     },
     "tca_mj.agents": {
