@@ -90,6 +90,8 @@ def test_the_page_can_be_followed(tmp_path, monkeypatch, capsys):
         sys.modules.pop(name, None)
     said = capsys.readouterr().out
     assert "Verdict: all cases are within 1 % of L and 2°" in said and "success after" in said
+    tips = re.findall(r"the tip is at (.*) mm", said)
+    assert len(tips) == 2 and tips[0] == tips[1]  # in the simulation, and in plain MuJoCo
     assert json.loads((tmp_path / "certificate" / "report.json").read_text("utf-8"))["within"]
     for name in ("robot.rrd", "demo/rollout.rrd", "demo/rollout.csv", "learned/best.npz",
                  "two_modules.xml", "script/summary.md", "learned/eval/summary.md"):  # fmt: skip

@@ -12,9 +12,9 @@ from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
-from tqdm import tqdm
 
 from tca_mj import pages
+from tca_mj.agents.progress import progress_bar
 from tca_mj.agents.workers import Workers
 from tca_mj.certify.cases import Case
 from tca_mj.certify.outcomes import POSITION, ROTATION, Effort, Outcome, judge
@@ -95,7 +95,7 @@ def certify_robot(
     found: dict[int, Outcome] = {}
     with (
         Workers(workers if isinstance(robot, str) else 1) as processes,
-        tqdm(total=len(asked), disable=None, unit="case", leave=False) as bar,
+        progress_bar(len(asked), unit="cases", leave=False) as bar,
     ):
         for place, row in processes.run(_answer, [(*job, one) for one in asked]):
             found[place] = row
