@@ -173,7 +173,7 @@ class SimulationBatch(Held):
         astray |= (batch.warning[rows][:, list(DIVERGENCE), 1] > 0).any(axis=-1)
         for name in ("qpos", "qvel"):
             astray |= ~np.isfinite(batch.bind(name)[rows]).all(axis=-1)
-        every.settle(batch.qpos[rows])
+        every.locate(batch.qpos[rows])
         for k in np.flatnonzero(~astray):
             batch.get_data(int(ids[k]), sims[k].data)
             every.give_back(int(k))
@@ -248,7 +248,7 @@ class _Every:
         for k in which:
             self.sims[k].take(each[k])
 
-    def settle(self, qpos: Array) -> None:
+    def locate(self, qpos: Array) -> None:
         """Computes the bodies where they are now, which tasks ask for next."""
         self.now = list(qpos.copy()), unstacked(self.body.at(qpos))
         self.ended = unstacked((self.tca, self.pull, self.strained, self.power.copy()))

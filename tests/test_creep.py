@@ -34,7 +34,7 @@ CREEP = CreepSpec()
 
 
 def hanging(tca, load, temperature=25.0):
-    return float(LoadedTcas([tca], Load(force=load)).settle([temperature])[0])
+    return float(LoadedTcas([tca], Load(force=load)).equilibrium([temperature])[0])
 
 
 def test_the_natural_length_does_not_creep_without_load():

@@ -159,7 +159,7 @@ def test_the_quasistatic_path_is_of_second_order_in_its_heat():
 def test_the_equilibrium_is_where_the_rod_carries_the_load():
     tcas = LoadedTcas([TCA], Load.weight(MASS))
     for temperature in (25.0, 90.0, 160.0):
-        length = tcas.settle([temperature])[0]
+        length = tcas.equilibrium([temperature])[0]
         theory = brentq(lambda x, t=temperature: coil_tension(TCA, x, t)[0] - MASS * G, 0.03, 0.12,
                         xtol=1e-15, rtol=1e-14)  # fmt: skip
         assert length == pytest.approx(theory, abs=1e-12)
@@ -172,7 +172,7 @@ def test_at_constant_power_a_damped_weight_comes_to_rest_in_the_static_solution(
     course = tcas.simulate(tcas.rest(), Heating(value=power), 0.05, 1000)
     settled = 25.0 + power / tcas.heat.loss
     np.testing.assert_allclose(course.temperature[-1], settled, rtol=1e-6)
-    np.testing.assert_allclose(course.length[-1], tcas.settle(settled), atol=1e-7)
+    np.testing.assert_allclose(course.length[-1], tcas.equilibrium(settled), atol=1e-7)
     if name == "type-0-180":
         assert course.length[-1, 0] < CATALOGUE[name].minimum_length
 
@@ -221,7 +221,7 @@ def test_a_spring_of_a_linear_tca_has_a_closed_form():
     assert tcas.rest().length[0] == pytest.approx(start, abs=1e-12)
     temperature = np.array([[25.0], [60.0], [125.0]])
     theory = start - 20.0 * 1e-4 * (temperature - 25.0) / 50.0
-    length = tcas.settle(temperature)
+    length = tcas.equilibrium(temperature)
     np.testing.assert_allclose(length, theory, atol=1e-12)
     course = tcas.simulate(tcas.rest(), Heating(value=1.0), 0.1, 50, "quasistatic")
     np.testing.assert_allclose(
@@ -249,7 +249,7 @@ def test_heat_of_a_held_source():
 
 def test_blown_air_cools_faster_and_lets_the_weight_down():
     tcas = LoadedTcas([TCA], Load.weight(MASS, 0.1))
-    hot = tcas.settle([120.0])
+    hot = tcas.equilibrium([120.0])
     start = LoadState(hot, np.zeros(1), np.array([120.0]), np.zeros(1))
     still = tcas.simulate(start, Heating(), 0.01, 100)
     blown = tcas.simulate(start, Heating(air=3.0), 0.01, 100)
@@ -374,7 +374,7 @@ def test_the_bracketed_search_solves_what_newton_does_not():
 
     tcas = LoadedTcas([TCA], Load(force=0.32), law=law)
     theory = 0.06 + 1e-4 * math.tan(0.1)
-    assert tcas.settle([25.0])[0] == pytest.approx(theory, abs=1e-12)
+    assert tcas.equilibrium([25.0])[0] == pytest.approx(theory, abs=1e-12)
 
 
 def test_bad_inputs_are_refused():
@@ -407,7 +407,7 @@ def test_bad_inputs_are_refused():
     with pytest.raises(ValueError, match="too large"):
         LoadedTcas([TCA], Load.weight(50.0)).rest()
     with pytest.raises(ValueError, match="temperature"):
-        tcas.settle([math.nan])
+        tcas.equilibrium([math.nan])
     with pytest.raises(ValueError, match="moves too fast"):
         tcas.simulate(state_of(0.05, velocity=-20.0), Heating(), 1e-2, 5)
     assert issubclass(MotionSolveError, ArithmeticError)

@@ -56,7 +56,7 @@ CALLS = {
     "power_from_voltage": (power_from_voltage, (5.0, 3.0)),
     "resistance": (lambda x, t: resistance(WIRE, [x], [t]), (0.05, 100.0)),
     "sensed_length": (lambda r: sensed_length(WIRE, [r]), (3.0,)),
-    "settle": (lambda t: LIFTING.settle([t]), (60.0,)),
+    "equilibrium": (lambda t: LIFTING.equilibrium([t]), (60.0,)),
     "weight": (lambda m: Load.weight(m).force, (0.03,)),
     "spring": (lambda k, f, r: Load.spring(k, f, r).stiffness, (10.0, 0.05, 0.045)),
     "heating": (lambda v, a: Heating(value=v, air=a).value, (1.0, 2.0)),

@@ -37,7 +37,7 @@ SLOPE = 0.20 / 0.357 * OHMS / 0.110  # about 20 % over the free stroke of 35.7 %
 
 
 def stretched(load):
-    return LoadedTcas([TCA], Load(force=load)).settle(np.full(load.shape, 25.0))
+    return LoadedTcas([TCA], Load(force=load)).equilibrium(np.full(load.shape, 25.0))
 
 
 def test_resistance_rises_with_contraction_by_what_is_published():

@@ -247,7 +247,7 @@ def test_the_loop_settles_where_power_and_heat_balance():
     start = float(tcas.rest().length[0])
 
     def displacement(temperature):
-        return 1e3 * (start - float(tcas.settle([temperature])[0]))
+        return 1e3 * (start - float(tcas.equilibrium([temperature])[0]))
 
     def excess(temperature):
         moved = displacement(temperature)

@@ -127,15 +127,15 @@ class LoadedTcas:
 
     @door
     def rest(self, batch_shape: tuple[int, ...] = ()) -> LoadState:
-        """Loaded equilibrium at ambient temperature, shape batch_shape + (n,); errors: ``settle``.
+        """Loaded equilibrium at ambient temperature, shape batch_shape + (n,); errors: ``equilibrium``.
         """
         shape = np.broadcast_shapes((*batch_shape, self.n), np.shape(self.load.force))
         temperature = np.broadcast_to(self.heat.ambient, shape).copy()
-        length = self.settle(temperature)
+        length = self.equilibrium(temperature)
         return LoadState(length, np.zeros_like(length), temperature, np.zeros_like(length))
 
     @door
-    def settle(self, temperature: ArrayLike, guess: ArrayLike | None = None) -> Array:
+    def equilibrium(self, temperature: ArrayLike, guess: ArrayLike | None = None) -> Array:
         """Length at which tension and load balance, the static solution.
 
         Args:
@@ -194,7 +194,7 @@ class LoadedTcas:
         Raises:
             ValueError: If ``dt`` or ``motion`` is wrong, a dynamic load has no mass, a length
                 leaves ``shortest`` to ``longest``, or the law refuses the temperature.
-            MotionSolveError: As ``settle``.
+            MotionSolveError: As ``equilibrium``.
         """
         require_positive(dt=dt)
         instance("state", state, LoadState)
@@ -253,9 +253,9 @@ class LoadedTcas:
         guess = state.length
         if heating.source != "power":
             _, middle, _ = self.heated(state, heating, dt, guess)
-            guess = self.settle(middle, guess)
+            guess = self.equilibrium(middle, guess)
         power, _, temperature = self.heated(state, heating, dt, guess)
-        length = self.settle(temperature, guess)
+        length = self.equilibrium(temperature, guess)
         return LoadState(length, np.zeros_like(length), temperature, power)
 
     def heated(
