@@ -127,8 +127,7 @@ class LoadedTcas:
 
     @door
     def rest(self, batch_shape: tuple[int, ...] = ()) -> LoadState:
-        """Loaded equilibrium at ambient temperature, shape batch_shape + (n,); errors: ``equilibrium``.
-        """
+        """Equilibrium at ambient temperature, shape batch_shape + (n,); errors: ``equilibrium``."""
         shape = np.broadcast_shapes((*batch_shape, self.n), np.shape(self.load.force))
         temperature = np.broadcast_to(self.heat.ambient, shape).copy()
         length = self.equilibrium(temperature)
