@@ -198,8 +198,8 @@ class MorphModule(SimulatedTask):
             data.qpos[self._bend_q] = setup["start"] / len(self._bend_q)
 
         self.sim.reset(place)
-        self._at_goal = 0
-        self._progress = self._measure(self.angle)
+        self._at_goal, self._bent = 0, self.angle  # which every observation brings up to date
+        self._progress = self._measure(self._bent)
 
     def drive(self, command: NDArray[np.float64]) -> Drive:
         """Voltage of the heater, what the TCA is told, and the fan; see the class."""
