@@ -60,6 +60,7 @@ class Option(Checked):
     check: Callable[[Any], None] | None = None
 
     def __post_init__(self) -> None:
+        Checked.__post_init__(self)
         bounded = self.choices or np.isfinite([self.low, self.high]).all()
         if self.draw is None and not bounded:
             raise ValueError(
