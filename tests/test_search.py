@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
 from tca_mj.agents.policies import Origin, SavedPolicy
 from tca_mj.agents.scripts.tetrapod import GAITS, STEERING, WALK
@@ -191,6 +192,25 @@ def test_a_search_that_is_stopped_anywhere_goes_on_with_nothing_lost(monkeypatch
     assert len(parts) == 11 and sum(part.done for part in parts) == whole.done  # none ran twice
     assert found == expected
     assert (tmp_path / "parts" / "curve.csv").read_bytes() == curve
+
+
+def test_tensorboard_has_every_point_once(monkeypatch, tmp_path):
+    found = None
+    for stop in range(20, 200, 20):
+        monkeypatch.setattr(searching, "Workers", Model(stop_after=stop))
+        try:
+            found = search(TINY, tmp_path, progress=False)
+        except KeyboardInterrupt:
+            assert found is None
+    monkeypatch.setattr(searching, "Workers", Model())
+    assert search(TINY, tmp_path, progress=False) == found  # there is nothing to do
+    rows = list(csv.DictReader((tmp_path / "curve.csv").read_text().splitlines()))
+    shown = EventAccumulator(str(tmp_path / "tensorboard")).Reload()
+    for name in ("score_mean", "validation_score"):
+        points = [(event.step, event.value) for event in shown.Scalars(f"search/{name}")]
+        some = [row for row in rows if row[name]]
+        assert len(some) >= 2 and [step for step, _ in points] == [int(r["steps"]) for r in some]
+        assert [value for _, value in points] == pytest.approx([float(r[name]) for r in some])
 
 
 @pytest.mark.usefixtures("quiet")

@@ -13,11 +13,14 @@ import numpy as np
 import pytest
 import torch
 from stable_baselines3.common.vec_env import VecNormalize
+from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
+from tca_mj.agents.episode import Episode
 from tca_mj.agents.policies import SavedPolicy, load_policy
 from tca_mj.agents.policies.files import ResidualPolicy
 from tca_mj.agents.scripts.tetrapod import GAITS, STEERING, gait_policy
 from tca_mj.agents.train import config as settings
+from tca_mj.agents.train import deep
 from tca_mj.agents.train.config import OffPolicy, OnPolicy, TrainConfig, default_config
 from tca_mj.agents.train.deep import Run, _learner, train
 from tca_mj.agents.train.export import exported
@@ -156,6 +159,74 @@ def test_a_run_that_is_killed_goes_on(tmp_path):
     assert written(out) == written(tmp_path / "whole")
     assert (out / "best.rrd").is_file() and not list(out.glob(".*"))
     assert list((out / "tensorboard").iterdir())
+
+
+def test_tensorboard_has_every_point_once(tmp_path, monkeypatch):
+    """However often the run is broken off after its state is written, before its curves are."""
+    monkeypatch.setattr("tca_mj.agents.train.deep.record", lambda *_, **__: None)
+    config, explain, broken = tiny("ppo"), Run.explain, []
+
+    def breaking(self):
+        if self.model.num_timesteps in (40, 80) and self.model.num_timesteps not in broken:
+            broken.append(self.model.num_timesteps)
+            raise KeyboardInterrupt
+        explain(self)
+
+    monkeypatch.setattr(Run, "explain", breaking)
+    for _ in range(2):
+        with pytest.raises(KeyboardInterrupt):
+            train(config, tmp_path, progress=False, video=False)
+    train(config, tmp_path, progress=False, video=False)
+    train(config, tmp_path, progress=False, video=False)  # there is nothing to do
+    shown = EventAccumulator(str(tmp_path / "tensorboard")).Reload()
+    for kind, name, file in (("training", "episodes", "curve.csv"),
+                             ("evaluation", "return", "evaluations.csv")):  # fmt: skip
+        rows = list(csv.DictReader((tmp_path / file).read_text().splitlines()))
+        points = [(event.step, event.value) for event in shown.Scalars(f"{kind}/{name}")]
+        assert [step for step, _ in points] == [float(row["steps"]) for row in rows]
+        assert [value for _, value in points] == pytest.approx([float(r[name]) for r in rows])
+
+
+def contents(folder):
+    return {path.name: path.read_bytes() for path in folder.iterdir() if path.is_file()}
+
+
+def test_a_film_can_be_left_for_later(tmp_path, monkeypatch, capsys):
+    """Broken off it leaves what there was, and says how it is made; a new best removes it."""
+    config = tiny("ppo", steps=20)
+    policy = train(config, tmp_path, progress=False, video=False)
+    before = contents(tmp_path)
+    assert "best.rrd" in before
+
+    class Filmed(Episode):
+        def run(self, limit, *, speed, progress):
+            self.env.close()
+            (self.out / "rollout.mp4").write_bytes(b"half")
+            if stop:
+                raise KeyboardInterrupt
+            return {"files": ["rollout.mp4"]}
+
+    monkeypatch.setattr(deep, "Episode", Filmed)
+    stop = True
+    monkeypatch.setattr(settings, "default_config", lambda *_, **__: config)
+    command = ["train", QUICK, "--algo", "ppo", "--out", str(tmp_path)]
+    assert main(command) == 130
+    said = capsys.readouterr().err
+    assert "but for its film, which the same command makes, or" in said
+    assert f"tca-mj demo --policy {tmp_path} --task {QUICK}\n" in said
+    noted = ("run.json", "last.npz")  # the command
+    after = contents(tmp_path)
+    assert after == before | {name: after[name] for name in noted}
+    stop = False
+    assert main(command) == 0 and (tmp_path / "best.mp4").read_bytes() == b"half"
+    stop = True
+    assert main(command) == 0  # it is made once
+    with pytest.raises(KeyboardInterrupt):
+        deep.record(config, tmp_path, policy)
+    assert contents(tmp_path)["best.mp4"] == b"half" and not list(tmp_path.glob(".*"))
+    monkeypatch.undo()
+    deep.record(config, tmp_path, policy)  # of what may be another policy
+    assert "best.mp4" not in contents(tmp_path) and not list(tmp_path.glob(".*"))
 
 
 @pytest.mark.parametrize("algorithm", LEARNERS)

@@ -138,7 +138,7 @@ def search(
         ends.enter_context(claimed(out))
         folder = RunFolder(out, config, command)
         state, known = folder.load() or (SearchState(optimiser=optimiser), {})
-        board = folder.tensorboard(state.steps)
+        board = folder.tensorboard(int(state.rows[-1]["steps"]) if state.rows else 0)
         ends.callback(board.close)
         bar = progress_bar(config.steps, unit="steps", done=state.steps, progress=progress)
         ends.callback(bar.close)
@@ -154,7 +154,8 @@ def search(
             run.show()
             bar.set_postfix(run.shown(), refresh=False)
             bar.update(run.state.steps - bar.n)
-        run.validate()
+        if run.validate():
+            run.show("validation")
     return run.policy(best=True)
 
 
@@ -227,12 +228,14 @@ class _Search:
             rows=(*state.rows, row),
         )  # fmt: skip
 
-    def validate(self) -> None:
-        """Judges the middle of the search, unless that is done."""
+    def validate(self) -> bool:
+        """Judges the middle of the search, unless that was done before."""
         rows = self.state.rows
-        if rows and "validation_score" not in rows[-1]:
+        new = bool(rows) and "validation_score" not in rows[-1]
+        if new:
             middle = self.space.fold(self.state.optimiser.mean)
             self._judge(f"validation {self.state.generation}", middle)
+        return new
 
     def _judge(self, label: str, point: NDArray[np.float64]) -> None:
         """Scores a point in the validation's episodes, and keeps it if it is the best."""
@@ -272,11 +275,13 @@ class _Search:
     def _validation(self) -> list[int]:
         return drawn(self.config.seed, 0, self.config.validation_episodes)
 
-    def show(self) -> None:
-        """Shows the last row in TensorBoard, at the steps that the state stands at."""
+    def show(self, kind: str = "") -> None:
+        """Shows the last row in TensorBoard, or what of it begins with ``kind``."""
         self.folder.require_room()
-        for name, value in self.state.rows[-1].items() if self.state.rows else ():
-            self.board.add_scalar(f"search/{name}", value, self.state.steps)
+        row = self.state.rows[-1] if self.state.rows else {}
+        for name, value in row.items():
+            if name.startswith(kind):
+                self.board.add_scalar(f"search/{name}", value, int(row["steps"]))
         self.board.flush()
 
     def shown(self) -> dict[str, str]:
