@@ -29,10 +29,11 @@ def how_to_install(extra: str) -> str:
     """The command that installs the packages of an extra, under the names that an index has."""
     try:
         everything = requires("tca-mj") or []
-    except PackageNotFoundError:  # a checkout that is not installed
-        return f"pip install -e '.[{extra}]'"
+    except PackageNotFoundError:
+        everything = []
     needed = [text.partition(";")[0] for text in everything if text.endswith(f'"{extra}"')]
-    return f"pip install {shlex.join(needed)}"
+    # A checkout that is not installed, or was before there was this extra, says itself what it is.
+    return f"pip install {shlex.join(needed or ['-e', f'.[{extra}]'])}"
 
 
 def machine() -> dict[str, str | int]:

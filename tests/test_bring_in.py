@@ -20,6 +20,7 @@ from tca_mj.agents.policies import Preprocessing, SavedPolicy, Statistics, load_
 from tca_mj.agents.rollout import rollout
 from tca_mj.agents.train.sb3_env import TaskVecEnv
 from tca_mj.envs import viewer
+from tca_mj.machine import how_to_install
 
 ROOT = Path(__file__).parent.parent
 NOD = "own_task:Example/Nod-v0"
@@ -132,7 +133,7 @@ def test_without_onnx_it_says_what_to_install(
 
     monkeypatch.setitem(sys.modules, "onnx", None)
     assert cli.main(["export", "bend-reach", "--onnx", str(tmp_path / "a.onnx")]) == 2
-    assert "pip install 'tca-mj[onnx]'" in capsys.readouterr().err
+    assert how_to_install("onnx") in capsys.readouterr().err
 
 
 def test_statistics_need_no_trust_without_a_pickle(tmp_path: Path, capsys: Any) -> None:

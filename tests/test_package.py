@@ -2,6 +2,7 @@
 
 import ast
 import re
+import shlex
 import shutil
 import subprocess
 import sys
@@ -16,6 +17,7 @@ import pytest
 import tca_mj
 from tca_mj import registry
 from tca_mj.assets import mjcf
+from tca_mj.machine import how_to_install
 
 ROOT = Path(__file__).resolve().parent.parent
 SHIPPED = ("tca_mj", "envs", "agents", "assets")
@@ -60,6 +62,25 @@ def test_no_file_speaks_of_single_machines_or_unfinished_work():
         if FORBIDDEN.search(line)
     ]
     assert found == []
+
+
+def test_hints_name_packages_that_an_index_has(monkeypatch):
+    """This one is on none; a test of the same words in what is shipped."""
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    extras = project["optional-dependencies"]
+    monkeypatch.setattr(
+        "tca_mj.machine.requires", lambda _: [
+            f'{package}; extra == "{name}"' for name in extras for package in extras[name]
+        ]
+    )  # fmt: skip
+    assert how_to_install("sweep") == "pip install 'ray[tune]>=2.50'"
+    for name in set(extras) - {"dev"}:
+        assert shlex.split(how_to_install(name)) == ["pip", "install", *extras[name]]
+    monkeypatch.setattr("tca_mj.machine.requires", lambda _: None)
+    assert how_to_install("rl") == "pip install -e '.[rl]'"
+    hint = re.compile(r"install\b[^`\n]*\btca-mj\[")
+    assert [path for path in project_files() if path.suffix == ".py" and path.parts[-2] != "tests"
+            and hint.search(text_of(path))] == []  # fmt: skip
 
 
 @pytest.mark.parametrize("text", ["/w" "ork/x", "# T" "ODO: later", "raise N" "otImplementedError"])

@@ -142,9 +142,9 @@ def _export(arguments: argparse.Namespace) -> int:
     for every curve. In Python, `tca_mj.record.read` gives the same as arrays.
 
     With --onnx, writes the network of a policy for other runtimes: `observation`, float32 of shape
-    (batch, n) in the units of the task, becomes `action`; normalisation is part of it. Needs
-    `pip install 'tca-mj[onnx]'`. With --npz, writes a model of Stable-Baselines3 as a policy of
-    this package, which then says itself what is said of it here.
+    (batch, n) in the units of the task, becomes `action`; normalisation is part of it. Needs the
+    extra onnx. With --npz, writes a model of Stable-Baselines3 as a policy of this package, which
+    then says itself what is said of it here.
 
     examples:
       tca-mj export runs/demo/{demo}/rollout.rrd
