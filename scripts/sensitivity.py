@@ -9,7 +9,6 @@ import math
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
-from multiprocessing import Pool
 from pathlib import Path
 from typing import Any
 from unittest import mock
@@ -18,6 +17,7 @@ import mujoco
 import numpy as np
 
 from tca_mj.agents.scripts.tetrapod import gait_policy
+from tca_mj.agents.workers import Workers
 from tca_mj.envs.tetrapod import TetrapodGait
 from tca_mj.modules import continuum_leg as leg
 from tca_mj.modules.bending import BendingSpec, bending_module
@@ -313,8 +313,9 @@ def table(processes: int) -> str:
     jobs: list[tuple[int | None, int, str]] = [(None, 0, name) for name in RESULTS]
     for i, constant in enumerate(CONSTANTS):
         jobs += [(i, k, name) for k in range(len(constant.values)) for name in constant.moves]
-    with Pool(processes) as pool:
-        found = dict(zip(jobs, pool.map(compute, jobs, chunksize=1), strict=True))
+    with Workers(processes) as workers:
+        done = workers.run(compute, [(job,) for job in jobs])
+        found = {jobs[i]: result for i, result in done}
     base = {name: found[None, 0, name] for name in RESULTS}
     heads = [f"{name}: {base[name]:.3g}{unit}" for name, (unit, _) in RESULTS.items()]
     lines = [f"| constant | kind | in use | instead | {' | '.join(heads)} |",

@@ -10,18 +10,18 @@ code between two releases are not seen: use ``--fresh`` after them.
 
 import argparse
 import json
-import multiprocessing
 import sys
 from collections.abc import Iterable, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from tqdm import tqdm
 
 from tca_mj.agents.demo import play
+from tca_mj.agents.progress import progress_bar
+from tca_mj.agents.workers import Workers
 from tca_mj.envs.arm import OBJECTS
+from tca_mj.files import append_whole, claimed, write_whole
 from tca_mj.machine import machine, versions
 
 TASK = "TCA/ArmPickPlace-v0"
@@ -35,13 +35,13 @@ def run(case: tuple[str, int]) -> dict[str, Any]:
 def kept(path: Path) -> dict[tuple[str, int], dict[str, Any]]:
     """Results of the present versions in a file; a line that was cut off is skipped."""
     found: dict[tuple[str, int], dict[str, Any]] = {}
-    for line in path.read_text(encoding="utf-8").splitlines() if path.exists() else ():
+    for line in path.read_bytes().splitlines() if path.exists() else ():
         try:
             result = json.loads(line)
-        except ValueError:
+            if result["versions"] == versions():
+                found[result["object"], result["seed"]] = result
+        except (ValueError, TypeError, LookupError):
             continue
-        if result["versions"] == versions():
-            found[result["object"], result["seed"]] = result
     return found
 
 
@@ -81,6 +81,10 @@ def table(results: Iterable[dict[str, Any]]) -> str:
     return "\n".join(lines)
 
 
+def _line(result: dict[str, Any]) -> bytes:
+    return f"{json.dumps(result, ensure_ascii=False)}\n".encode()
+
+
 def _energy(result: dict[str, Any]) -> float:
     return sum(result["energy"].values())
 
@@ -105,28 +109,23 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument("--fresh", action="store_true", help="forget earlier results")
     arguments = parser.parse_args(argv)
 
-    arguments.out.mkdir(parents=True, exist_ok=True)
     path = arguments.out / "results.jsonl"
-    if arguments.fresh:
-        path.unlink(missing_ok=True)
     kinds = [arguments.object] if arguments.object else list(OBJECTS)
     cases = [(kind, seed) for seed in range(arguments.seeds) for kind in kinds]
-    results = kept(path)
-    missing = [case for case in cases if case not in results]
-    context = multiprocessing.get_context("spawn")
-    pool = ProcessPoolExecutor(arguments.workers, mp_context=context)
     try:
-        waiting = [pool.submit(run, case) for case in missing]
-        for done in tqdm(as_completed(waiting), total=len(waiting), unit="episode", disable=None):
-            result = done.result()
-            results[result["object"], result["seed"]] = result
-            with path.open("a", encoding="utf-8") as file:
-                file.write(json.dumps(result, ensure_ascii=False) + "\n")
+        with claimed(arguments.out):
+            results = {} if arguments.fresh else kept(path)
+            write_whole(path, b"".join(map(_line, results.values())))
+            missing = [(case,) for case in cases if case not in results]
+            bar = progress_bar(len(missing), unit="episodes")
+            with bar, Workers(min(arguments.workers, len(missing))) as processes:
+                for _, result in processes.run(run, missing):
+                    results[result["object"], result["seed"]] = result
+                    append_whole(path, _line(result))
+                    bar.update()
     except KeyboardInterrupt:
         print(f"interrupted; run it again to go on from {path}", file=sys.stderr)
         return 130
-    finally:
-        pool.shutdown(wait=False, cancel_futures=True)
 
     where = machine()
     said = table(results[case] for case in cases)
@@ -134,7 +133,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         f"{said}\n\n{where['cpu']}, {where['cores']} cores; "
         + ", ".join(f"{name} {number}" for name, number in versions().items())
     )
-    (arguments.out / "table.md").write_text(report + "\n", encoding="utf-8")
+    write_whole(arguments.out / "table.md", f"{report}\n".encode())
     print(report)
     return 0
 

@@ -18,7 +18,6 @@ how often in a second a foot loses its contact. Dragged: mean speed of a foot wh
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
-from multiprocessing import Pool
 from typing import Any
 from unittest.mock import patch
 
@@ -27,6 +26,7 @@ import numpy as np
 
 from tca_mj.agents.policies import load_policy
 from tca_mj.agents.scripts.tetrapod import GAITS, gait_policy
+from tca_mj.agents.workers import Workers
 from tca_mj.envs.tetrapod import ACTION, TetrapodGait
 from tca_mj.machine import machine, versions
 from tca_mj.robots.tetrapod import LEGS
@@ -254,9 +254,9 @@ def main() -> None:
     print("; ".join(f"{key} {value}" for key, value in {**machine(), **versions()}.items()))
     costs = {gait: cost(gait) for gait in GAITS}
     drags = [(row, step) for row in HARD for step in (5e-4, 2.5e-4, 1.25e-4)]
-    with Pool(2) as pool:
-        dragged = pool.starmap(drag, drags, chunksize=1)
-        found = list(pool.imap_unordered(follow, runs(), chunksize=1))
+    with Workers(2) as workers:
+        dragged = [each for _, each in sorted(workers.run(drag, drags), key=lambda row: row[0])]
+        found = [each for _, each in workers.run(follow, [(run,) for run in runs()])]
     by = {(run.gait, run.who, run.row): (way, depth) for run, way, depth in found}
     rows: dict[str, list[str]] = {}
     columns = [(gait, who) for gait in GAITS for who in WHO]

@@ -4,6 +4,7 @@ import errno
 import json
 import os
 import pickle
+import re
 import signal
 import stat
 import subprocess
@@ -179,6 +180,20 @@ def test_a_recording_ends_before_the_disk_is_full(tmp_path, monkeypatch):
     with pytest.raises(OSError, match="No space left"):
         Recorder(sim, tmp_path / "b.rrd")
     assert names(tmp_path) == ["a.rrd"]
+
+
+def test_files_are_written_in_one_place():
+    """Whole ones; Rerun and the encoder of films write theirs as they go."""
+    root = Path(__file__).parent.parent
+    writing = re.compile(
+        r"\.write_(text|bytes)\(|\bopen\([^)\n]*[\"'][wax]b?\+?[\"']|savefig\((?!memory)"
+    )
+    found = {
+        path.relative_to(root).as_posix()
+        for folder in ("tca_mj", "agents", "envs") for path in (root / folder).rglob("*.py")
+        if writing.search(path.read_text(encoding="utf-8"))
+    }  # fmt: skip
+    assert found == {"tca_mj/files.py"}
 
 
 BROKEN = {"empty": b"", "list": b"[]", "null": b"null", "cut off": b'{"config": {"ta',

@@ -1,6 +1,7 @@
 """Whatever ends a process: what is finished is kept, nothing runs on, and nothing hangs."""
 
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -121,6 +122,17 @@ def test_a_signal_amid_an_import_ends_with_its_code(tmp_path):
                   env=os.environ | {"PYTHONPATH": str(tmp_path)})  # fmt: skip
     _, said = run.communicate(timeout=PATIENCE)
     assert (run.returncode, said) == (143, "ended by SIGTERM\n")
+
+
+def test_processes_are_started_in_one_place():
+    """What else starts some leaves them behind when it is killed."""
+    root = Path(__file__).parent.parent
+    pools = re.compile(r"^ *(import|from) (multiprocessing|concurrent\.futures)\b", re.MULTILINE)
+    assert [
+        str(path.relative_to(root))
+        for folder in ("tca_mj", "agents", "envs", "scripts", "examples")
+        for path in (root / folder).rglob("*.py") if pools.search(path.read_text(encoding="utf-8"))
+    ] == [str(Path("agents", "workers.py"))]  # fmt: skip
 
 
 FORKED = """
