@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from contextlib import nullcontext
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import gymnasium as gym
 import numpy as np
@@ -13,23 +14,27 @@ import numpy as np
 from tca_mj.agents.episode import PLOT, RECORDING, VIDEO, Episode
 from tca_mj.agents.policies import Policy, Preprocessing
 from tca_mj.agents.policies.actors import actor, arguments_of
-from tca_mj.checks import require_positive
+from tca_mj.checks import Seed, door, number
 from tca_mj.files import claimed
+from tca_mj.record.film import FilmSpeed
 from tca_mj.registry import make
 
+_Duration = Annotated[float, partial(number, above=0.0, at_most=86_400.0, unit="s")]
 
+
+@door
 def play(
     task: str,
     policy: str | Path | Policy = "scripted",
     *,
-    seed: int = 0,
+    seed: Seed = 0,
     options: Mapping[str, Any] | None = None,
     arguments: Mapping[str, Any] | None = None,
     preprocessing: Preprocessing | None = None,
     out: Path | None = None,
     video: bool = True,
-    speed: float | None = None,
-    max_duration: float | None = None,
+    speed: FilmSpeed | None = None,
+    max_duration: _Duration | None = None,
     progress: bool = True,
 ) -> dict[str, Any]:
     """Runs one episode of any policy in any task and writes what happened.
@@ -51,7 +56,8 @@ def play(
         out: Folder for the files, made if it is missing; None to write nothing.
         video: Whether to make the film, which takes longer than the simulation.
         speed: Simulated seconds per second of film [1]; None for what suits the task.
-        max_duration: Simulated time after which to stop [s]; None for the task's own limit.
+        max_duration: Simulated time after which to stop, at most a day [s]; None for the task's own
+            limit, where there is one.
         progress: Whether to show how far it is.
 
     Returns:
@@ -84,10 +90,6 @@ def play(
         >>> summary["duration"], summary["ending"]
         (0.5, 'stopped after 0.5 s')
     """
-    if max_duration is not None:
-        require_positive(max_duration=max_duration)
-    if speed is not None:
-        require_positive(speed=speed)
     named = isinstance(policy, str | Path)
     needed = arguments_of(str(policy), task) if named else {}
     env: gym.Env[Any, Any] = make(task, **needed | dict(arguments or {}))
@@ -103,4 +105,6 @@ def play(
             env, acting, names=(task, name), seed=seed, out=out, options=options, files=files
         )
         limit = min(max_duration or np.inf, episode.limit)
+        if limit == np.inf:
+            raise ValueError(f"max_duration must be given for {task}, which has no end, got None")
         return episode.run(limit, speed=speed or episode.task.film_speed, progress=progress)

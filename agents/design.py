@@ -6,11 +6,13 @@ from collections.abc import Mapping
 from dataclasses import fields, is_dataclass, replace
 from typing import Any
 
+from tca_mj.checks import door, number, shown, whole
 from tca_mj.hints import nearest
 from tca_mj.registry import task_class
 from tca_mj.tca import CATALOGUE, TcaSpec
 
 
+@door
 def robot_of(task: str, design: Mapping[str, Any]) -> dict[str, Any]:
     """Arguments of a task's class that make its robot differ from the default.
 
@@ -24,11 +26,12 @@ def robot_of(task: str, design: Mapping[str, Any]) -> dict[str, Any]:
     """
     robot = task_class(task).robot_argument
     if robot is None:
-        raise ValueError(f"design must be empty for {task}, got {sorted(design)}")
+        raise ValueError(f"design must be empty for {task}, got {shown(design)}")
     argument, default = robot
     return {argument: designed(default(), design)}
 
 
+@door
 def designed(spec: Any, design: Mapping[str, Any]) -> Any:
     """A specification with other figures; errors as ``robot_of``.
 
@@ -36,31 +39,35 @@ def designed(spec: Any, design: Mapping[str, Any]) -> Any:
         spec: The specification, which stays as it is.
         design: Values by path, such as ``leg.rod_diameter``.
     """
+    if not is_dataclass(spec) or isinstance(spec, type):
+        raise ValueError(f"spec must be a specification, got {shown(spec)}")
     # Whole TCAs first, then what is changed in them.
     for path in sorted(design, key=lambda path: path.count(".")):
-        spec = _changed(spec, path, path, design[path])
+        spec = _changed(spec, path, f"design {path!r}", design[path])
     return spec
 
 
-def _changed(spec: Any, path: str, whole: str, value: Any) -> Any:
+def _changed(spec: Any, path: str, design: str, value: Any) -> Any:
     name, _, rest = path.partition(".")
     known = [field.name for field in fields(spec)] if is_dataclass(spec) else []
     if name not in known:
         raise ValueError(
-            f"design {whole!r}: {name!r} must be one of {known}{nearest(name, known)}"
+            f"{design}: the name must be one of {known}, got {shown(name)}{nearest(name, known)}"
         )
     now = getattr(spec, name)
     if rest:
-        return replace(spec, **{name: _changed(now, rest, whole, value)})
+        return replace(spec, **{name: _changed(now, rest, design, value)})
     if isinstance(now, TcaSpec):
-        if value not in CATALOGUE:
+        if not isinstance(value, str) or value not in CATALOGUE:
             raise ValueError(
-                f"design {whole!r} must be one of {list(CATALOGUE)}, got {value!r}"
+                f"{design} must be one of {list(CATALOGUE)}, got {shown(value)}"
                 f"{nearest(value, CATALOGUE)}"
             )
         return replace(spec, **{name: CATALOGUE[value]})
+    if isinstance(now, float):
+        value = number(design, value)
+    elif isinstance(now, int) and not isinstance(now, bool):
+        value = whole(design, value)
     if isinstance(spec, TcaSpec) and name == "pitch_angle":
         return spec.of_pitch(value)
-    if isinstance(value, str) or isinstance(now, bool) != isinstance(value, bool):
-        raise ValueError(f"design {whole!r} must be a number like {now!r}, got {value!r}")
-    return replace(spec, **{name: type(now)(value) if isinstance(now, float) else value})
+    return replace(spec, **{name: value})

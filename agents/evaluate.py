@@ -29,12 +29,13 @@ from tca_mj.agents.policies.actors import NAMES, actor, arguments_of
 from tca_mj.agents.policies.load import find
 from tca_mj.agents.progress import progress_bar
 from tca_mj.agents.rollout import rollout
-from tca_mj.agents.workers import Workers
-from tca_mj.checks import Checked, Count, number, require_count
+from tca_mj.agents.workers import Processes, Workers
+from tca_mj.checks import Checked, Seed, door, number, require_one_of, whole
 from tca_mj.files import claimed
 from tca_mj.machine import machine, versions
 from tca_mj.pages import table, write_result
-from tca_mj.registry import make, task_class
+from tca_mj.registry import EpisodeSteps, episode_steps, make, task_class
+from tca_mj.sim import Timestep
 
 REPORT = "summary.md"
 
@@ -54,6 +55,8 @@ METRICS = {
 }
 _RATIOS = ("energy_per_metre", "cost_of_transport")
 _LEVEL, _RESAMPLES = 0.95, 10_000
+Episodes = Annotated[int, partial(whole, at_least=1, at_most=10_000)]
+"""How many at most: means are then known to a hundredth of what single ones differ by."""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -63,10 +66,11 @@ class Evaluation(Checked):
     Attributes:
         task: Gymnasium id, or ``module:id``.
         policy: Who acts, see ``tca_mj.agents.policies.actors.actor``.
-        episodes: How many episodes, at least 1.
+        episodes: How many episodes, 1 to 10 000.
         seed: Seed of the first one; the others follow.
         randomise: Share by which the robot is off, the task's option ``randomise``; 0 is nominal.
-        steps: Control steps after which an episode is over; None for the task's own limit.
+        steps: Control steps after which an episode is over; None for the task's own limit, where
+            there is one.
         model: ``used``, or the name of one of the task's finer models.
         timestep: Physics time step [s]; None for the task's own.
         design: Figures of the robot that differ from the default, see
@@ -81,26 +85,23 @@ class Evaluation(Checked):
 
     task: str
     policy: str = "scripted"
-    episodes: Count = 10
-    seed: int = 0
+    episodes: Episodes = 10
+    seed: Seed = 0
     randomise: Annotated[float, partial(number, at_least=0.0, at_most=0.5)] = 0.0
-    steps: int | None = None
+    steps: EpisodeSteps | None = None
     model: str = "used"
-    timestep: float | None = None
+    timestep: Timestep | None = None
     design: Mapping[str, Any] = field(default_factory=dict)
     arguments: Mapping[str, Any] = field(default_factory=dict)
     preprocessing: Preprocessing = Preprocessing()
 
     def __post_init__(self) -> None:
-        models = ("used", *task_class(self.task).finer)
-        if self.model not in models:
-            raise ValueError(f"model must be one of {models} for {self.task}, got {self.model!r}")
         Checked.__post_init__(self)
-        require_count(steps=1 if self.steps is None else self.steps)
+        require_one_of("model", self.model, ("used", *task_class(self.task).finer))
+        if self.steps is None and episode_steps(self.task) is None:
+            raise ValueError(f"steps must be given for {self.task}, which has no end, got None")
         if self.design:
             robot_of(self.task, self.design)
-        if self.seed < 0 or int(self.seed) != self.seed:
-            raise ValueError(f"seed must be a whole number of at least 0, got {self.seed}")
 
     @property
     def options(self) -> dict[str, float]:
@@ -137,12 +138,14 @@ class Evaluation(Checked):
             more |= task.finer[self.model](more.get(argument) or default())
         return make(self.task, max_episode_steps=self.steps, **more)
 
-    def actor(self, env: gym.Env[Any, Any], seed: int) -> Policy:
+    @door
+    def actor(self, env: gym.Env[Any, Any], seed: Seed) -> Policy:
         """Who acts in an environment; errors as ``tca_mj.agents.policies.actors.actor``."""
         return actor(self.policy, env, seed=seed, preprocessing=self.preprocessing)
 
 
-def run_episode(evaluation: Evaluation, seed: int) -> dict[str, Any]:
+@door
+def run_episode(evaluation: Evaluation, seed: Seed) -> dict[str, Any]:
     """Runs one episode.
 
     Args:
@@ -192,11 +195,12 @@ def run_episode(evaluation: Evaluation, seed: int) -> dict[str, Any]:
         env.close()
 
 
+@door
 def evaluate(
     evaluation: Evaluation,
     *,
     out: Path | None = None,
-    workers: int = 1,
+    workers: Processes = 1,
     fresh: bool = False,
     progress: bool = True,
 ) -> dict[str, Any]:
@@ -206,7 +210,7 @@ def evaluate(
         evaluation: What is evaluated.
         out: Folder for ``episodes.jsonl``, ``summary.json`` and ``summary.md``; None to write
             nothing.
-        workers: Processes; nothing depends on their number.
+        workers: Processes, 1 to 1024; nothing depends on their number.
         fresh: Whether to run again what the folder holds. Episodes of other settings, policies or
             versions of packages are not taken; changes of the code are not seen.
         progress: Whether to show how far it is.
@@ -217,12 +221,11 @@ def evaluate(
 
     Raises:
         FileNotFoundError: If there is no such policy.
-        ValueError: If it is for another task, or ``workers`` is below 1.
+        ValueError: If it is for another task, or ``workers`` is out of bounds.
         BlockingIOError: If another process works in ``out``.
         OSError: If something cannot be written.
         KeyboardInterrupt: As it came; the episodes that were finished are kept.
     """
-    require_count(workers=workers)
     key = evaluation.key()
     env = evaluation.make()
     evaluation.actor(env, evaluation.seed)  # before any process starts: who is wrong is told now
@@ -261,7 +264,8 @@ def _summed_up(
     return summary
 
 
-def figures(rows: Sequence[dict[str, Any]]) -> dict[str, dict[str, float | None]]:
+@door
+def figures(rows: Sequence[Mapping[str, Any]]) -> dict[str, dict[str, float | None]]:
     """Means over episodes, with 95 % intervals, of the ``METRICS`` that the rows have.
 
     Each has ``mean``, ``low`` and ``high`` (the interval, None where there is none), ``least`` and
@@ -270,9 +274,14 @@ def figures(rows: Sequence[dict[str, Any]]) -> dict[str, dict[str, float | None]
     resamples of the episodes; they are None if the robot did not get on.
 
     Args:
-        rows: Episodes, as ``run_episode`` returns them.
+        rows: Episodes, as ``run_episode`` returns them; at least one.
+
+    Raises:
+        ValueError: If there is none, or a figure of one is missing or no number.
     """
-    columns = {name: np.array([float(row[name]) for row in rows])
+    if not rows:
+        raise ValueError("rows must be episodes, got none")
+    columns = {name: np.array([_figure(name, row) for row in rows])
                for name in (*METRICS, "weight") if name in rows[0]}  # fmt: skip
     found: dict[str, dict[str, float | None]] = {}
     for name in METRICS:
@@ -287,6 +296,12 @@ def figures(rows: Sequence[dict[str, Any]]) -> dict[str, dict[str, float | None]
                 "least": float(values.min()), "most": float(values.max()),
             }  # fmt: skip
     return found
+
+
+def _figure(name: str, row: Mapping[str, Any]) -> float:
+    """One figure of an episode."""
+    found = row.get(name)
+    return float(found) if isinstance(found, bool | np.bool_) else number(name, found)
 
 
 def _interval(name: str, values: NDArray[np.float64]) -> tuple[float | None, float | None]:
@@ -327,24 +342,32 @@ def label(name: str) -> str:
 
     Args:
         name: Name of the figure, one of ``METRICS``.
+
+    Raises:
+        ValueError: If there is no such figure.
     """
-    unit = METRICS[name][0]
+    unit = METRICS[require_one_of("name", name, list(METRICS))][0]
     return name.replace("_", " ") + (f" [{unit}]" if unit else "")
 
 
-def cell(name: str, figure: dict[str, float | None], *, interval: bool = True) -> str:
+@door
+def cell(name: str, figure: Mapping[str, float | None], *, interval: bool = True) -> str:
     """A figure in its unit: mean, and the interval in brackets.
 
     Args:
         name: Name of the figure, one of ``METRICS``.
         figure: Its mean and interval, as ``figures`` returns them.
         interval: Whether the interval is wanted.
+
+    Raises:
+        ValueError: If there is no such figure.
     """
+    require_one_of("name", name, list(METRICS))
     text, low, high, *_ = _shown(name, figure)
     return f"{text} ({low} to {high})" if interval and low else text
 
 
-def _shown(name: str, figure: dict[str, float | None]) -> list[str]:
+def _shown(name: str, figure: Mapping[str, float | None]) -> list[str]:
     """Mean, low, high, least and most of a figure in its unit, empty where there is none."""
     _, factor, digits = METRICS[name]
     values = [figure.get(key) for key in ("mean", "low", "high", "least", "most")]

@@ -10,6 +10,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
+from tca_mj.checks import door
 from tca_mj.files import append_whole, write_whole
 
 EPISODES = "episodes.jsonl"
@@ -20,6 +21,7 @@ _OF_HEADWAY = ("distance", "drift", "speed", "weight")
 _LONGEST = 65_536  # of a line, more than an episode can have [bytes]
 
 
+@door
 def kept(path: Path, key: str) -> dict[int, dict[str, Any]]:
     """Episodes in a file that have ``key``, by seed; lines that are no episodes are left out.
 

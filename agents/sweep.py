@@ -11,6 +11,7 @@ from __future__ import annotations
 import hashlib
 import itertools
 import json
+import math
 import os
 import secrets
 import shutil
@@ -21,13 +22,15 @@ import threading
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, fields, replace
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 from tca_mj.agents.evaluate import METRICS, Evaluation, cell, evaluate, label
 from tca_mj.agents.output import read_json, write_csv, write_json
 from tca_mj.agents.progress import progress_bar
-from tca_mj.checks import number, require_count
+from tca_mj.agents.workers import Processes
+from tca_mj.checks import Checked, door, require_one_of, shown, whole
 from tca_mj.files import claimed, write_whole
 from tca_mj.machine import machine, versions
 from tca_mj.pages import table
@@ -40,10 +43,13 @@ ALGORITHMS = ("cma", "ppo", "sac", "td3")
 _RAY = {"RAY_USAGE_STATS_ENABLED": "0", "TUNE_DISABLE_SIGINT_HANDLER": "1"}
 
 Value = float | int | str
+MOST_TRIALS = 10_000
+"""Most combinations of a sweep, each of which has a folder and takes seconds at least."""
+_Failures = Annotated[int, partial(whole, at_least=0, at_most=100)]
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
-class Sweep:
+class Sweep(Checked):
     """What is swept.
 
     Attributes:
@@ -55,7 +61,8 @@ class Sweep:
             evaluated is then the best policy of the run. Training is on the default robot.
 
     Raises:
-        ValueError: If a name is unknown, a value cannot be, or an axis has no value or one twice.
+        ValueError: If a name is unknown, a value cannot be, an axis has no value or one twice, or
+            there are more than 10 000 combinations.
     """
 
     evaluation: Evaluation
@@ -63,11 +70,15 @@ class Sweep:
     algorithm: str | None = None
 
     def __post_init__(self) -> None:
-        if self.algorithm not in (None, *ALGORITHMS):
-            raise ValueError(f"algorithm must be one of {ALGORITHMS}, got {self.algorithm!r}")
+        Checked.__post_init__(self)
+        require_one_of("algorithm", self.algorithm, (None, *ALGORITHMS))
         for name, values in self.axes.items():
             if not values or len(set(values)) != len(values):
-                raise ValueError(f"{name} must have one or more values, all different: {values}")
+                raise ValueError(
+                    f"{name} must have one or more values, all different, got {shown(values)}"
+                )
+        count = math.prod(map(len, self.axes.values()))
+        whole("combinations of axes", count, at_most=MOST_TRIALS)
         for trial in self.trials():
             trial.config()  # whoever is wrong says so before anything runs
 
@@ -157,8 +168,10 @@ class Trial:
         return result
 
 
+@door
 def run_sweep(
-    sweep: Sweep, out: Path, *, workers: int = 2, address: str | None = None, failures: int = 3
+    sweep: Sweep, out: Path, *, workers: Processes = 2, address: str | None = None,
+    failures: _Failures = 3,
 ) -> list[dict[str, Any]]:
     """Runs what is missing of the trials and writes the table of all.
 
@@ -168,10 +181,10 @@ def run_sweep(
     Args:
         sweep: What is swept.
         out: Folder; on a cluster one that all machines see under the same path.
-        workers: Trials at a time, each in a process of its own with one core.
+        workers: Trials at a time, 1 to 1024, each in a process of its own with one core.
         address: Address of a running Ray cluster, as ``ray.init`` takes it; None for a cluster in
             this machine that ends with the sweep.
-        failures: How often a trial is begun again whose process was lost.
+        failures: How often a trial is begun again whose process was lost, up to 100 times.
 
     Returns:
         For each finished trial its ``point`` and its ``figures``, in the order of the axes.
@@ -185,8 +198,6 @@ def run_sweep(
         OSError: If something cannot be written.
         ValueError: If ``workers`` or ``failures`` is out of range.
     """
-    require_count(workers=workers)
-    number("failures", failures, at_least=0)
     out = out.absolute()
     trials = sweep.trials()
     files = [out / TRIALS / trial.name / RESULT for trial in trials]

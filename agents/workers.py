@@ -6,15 +6,21 @@ import signal
 import threading
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from functools import partial
 from multiprocessing import resource_tracker
 from multiprocessing.connection import wait
 from multiprocessing.process import BaseProcess
-from typing import Any, TypeVar
+from typing import Annotated, Any, TypeVar
+
+from tca_mj.checks import whole
 
 Found = TypeVar("Found")
 
 _STOPPING = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP")
              if hasattr(signal, name)]  # fmt: skip
+
+Processes = Annotated[int, partial(whole, at_least=1, at_most=1024)]
+"""How many at a time: as many as the largest machines have threads."""
 
 
 class Workers:

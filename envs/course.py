@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tca_mj.assets import mjcf
-from tca_mj.checks import door
+from tca_mj.checks import Checked, door
 from tca_mj.envs.options import Option, Options, Setup, Uniform, variation_options
 from tca_mj.envs.stance import CAMERAS, Stance, tetrapod_scene
 from tca_mj.envs.table import Entry, Table
@@ -59,7 +59,7 @@ _COLD = 80.0  # temperature up to which a spine is rigid, Sun, Section 6.1.3 [°
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
-class Places:
+class Places(Checked):
     """Where things are along the course, read from its file.
 
     Attributes:

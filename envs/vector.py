@@ -12,7 +12,7 @@ import os
 from collections.abc import Callable, Mapping, Sequence
 from copy import deepcopy
 from functools import partial
-from typing import Annotated, Any
+from typing import Any
 
 import gymnasium as gym
 import numpy as np
@@ -26,13 +26,10 @@ from tca_mj.batch import SimulationBatch
 from tca_mj.checks import Count, door, instance, require_one_of, shown, text, whole
 from tca_mj.envs.table import commands
 from tca_mj.envs.task import Observation, Outcome, SimulatedTask, together
-from tca_mj.registry import EpisodeSteps
+from tca_mj.registry import Envs, EpisodeSteps
 
 Options = Mapping[str, Any] | None
 Flags = NDArray[np.bool_]
-MOST_ENVS = 1024
-"""Most tasks of one vector environment: as many of the largest robot take 5 GB of memory."""
-Tasks = Annotated[int, partial(whole, at_least=1, at_most=MOST_ENVS)]
 _MODES = [mode.value for mode in AutoresetMode]
 
 
@@ -57,7 +54,7 @@ class TaskVector(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[Any
         self,
         task: Callable[..., SimulatedTask],
         *,
-        num_envs: Tasks = 1,
+        num_envs: Envs = 1,
         num_threads: Count | None = None,
         max_episode_steps: EpisodeSteps | None = None,
         autoreset_mode: AutoresetMode | str = AutoresetMode.SAME_STEP,

@@ -375,8 +375,9 @@ def by_type(hint: Any) -> Check | None:
         return _callable
     if inspect.isclass(hint) and getattr(hint, "_is_protocol", False):
         return partial(_alike, protocol=hint, members=_members(hint))
-    if _is_kind(hint):
-        return partial(_instance, kinds=(hint,), words=_word(hint))
+    kind = hint if origin in (None, np.ndarray) else origin  # of Env[...] and its like
+    if _is_kind(kind):
+        return partial(_instance, kinds=(kind,), words=_word(kind))
     return None
 
 

@@ -23,6 +23,9 @@ ControlPeriod = Annotated[float, partial(number, above=0.0, at_most=60.0, unit="
 MOST_EPISODE = 10_000_000
 """Most steps of an episode, 11 days of the shortest control period in use, 0.1 s."""
 EpisodeSteps = Annotated[int, partial(whole, at_least=1, at_most=MOST_EPISODE)]
+MOST_ENVS = 1024
+"""Most tasks of one vector environment: as many of the largest robot take 5 GB of memory."""
+Envs = Annotated[int, partial(whole, at_least=1, at_most=MOST_ENVS)]
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)

@@ -8,12 +8,14 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
+import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
 from tca_mj.agents.policies import Policy, Preprocessing, SavedPolicy, load_policy
 from tca_mj.agents.policies.gait import GaitPolicy
 from tca_mj.agents.policies.load import ZIP, find, require_arguments, require_untold
+from tca_mj.checks import Seed, door
 from tca_mj.control import Gait
 from tca_mj.registry import make, task_class
 
@@ -57,8 +59,10 @@ class Script:
         """Nothing is remembered."""
 
 
+@door
 def actor(
-    name: str | Path, env: Any, *, seed: int = 0, preprocessing: Preprocessing | None = None
+    name: str | Path, env: gym.Env[Any, Any], *, seed: Seed = 0,
+    preprocessing: Preprocessing | None = None,
 ) -> Policy:
     """Who acts in an environment.
 
@@ -83,9 +87,11 @@ def actor(
     if name == "random":
         uniform, size = np.random.default_rng(seed).uniform, env.action_space.shape
         return Blind("random", lambda: uniform(-1.0, 1.0, size).astype(np.float32))
-    return Blind("off", env.unwrapped.action.still.copy)
+    task: Any = env.unwrapped
+    return Blind("off", task.action.still.copy)
 
 
+@door
 def arguments_of(name: str | Path, task: str) -> dict[str, Any]:
     """Arguments of a task that a policy needs it to be made with; errors as ``actor``.
 
@@ -99,7 +105,8 @@ def arguments_of(name: str | Path, task: str) -> dict[str, Any]:
     return {} if path is None or path.suffix == ZIP else dict(SavedPolicy.read(path).arguments)
 
 
-def scripted(env: Any) -> Policy:
+@door
+def scripted(env: gym.Env[Any, Any]) -> Policy:
     """The scripted policy of an environment's task.
 
     Args:
@@ -108,12 +115,12 @@ def scripted(env: Any) -> Policy:
     Raises:
         ValueError: If it has none, or the task was not made with ``scripted_arguments``.
     """
-    task = env.unwrapped
+    task: Any = env.unwrapped
     maker = task.scripted
     if maker is None and hasattr(task, "script"):
         return Script(task.script)
     if maker is None:
-        raise ValueError(f"policy 'scripted': {type(task).__name__} has none")
+        raise ValueError(f"policy must be another than 'scripted', got {type(task).__name__}")
     require_arguments(task.scripted_arguments, env)
     if isinstance(maker, str):
         module, _, name = maker.partition(":")
@@ -122,6 +129,7 @@ def scripted(env: Any) -> Policy:
     return policy
 
 
+@door
 def first_gait(task: str, start: str) -> tuple[Gait, tuple[float, ...]]:
     """The gait from which something starts, and its steering per leg [K/rad].
 
@@ -137,12 +145,12 @@ def first_gait(task: str, start: str) -> tuple[Gait, tuple[float, ...]]:
     if start not in ("scripted", "trot"):
         saved = SavedPolicy.read(find(start))
         if saved.gait is None:
-            raise ValueError(f"start must have a gait, {start} is a {saved.kind}")
+            raise ValueError(f"start must have a gait, got {start}, a {saved.kind}")
         return saved.gait, saved.steering
     env = make(task, disable_env_checker=True, **arguments_of("scripted", task))
     script = scripted(env)
     env.close()
     if not isinstance(script, GaitPolicy):
-        raise ValueError(f"start must be a policy with a gait: the script of {task} has none")
+        raise ValueError(f"start must be a policy with a gait, got {start}, which {task} has not")
     gait = replace(script.gait, offset=TROT) if start == "trot" else script.gait
     return gait, tuple(np.broadcast_to(script.steering, gait.legs).tolist())

@@ -20,8 +20,9 @@ import json
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Annotated, Any, Protocol
 
+import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
@@ -30,11 +31,16 @@ from tca_mj.agents.policies.archives import LONGEST, arrays, content_of, why
 from tca_mj.agents.policies.gait import GaitPolicy
 from tca_mj.agents.policies.network import Network
 from tca_mj.agents.policies.onnx import onnx_model
+from tca_mj.checks import Checked, NotNegative, door, row, shown
 from tca_mj.control import Gait
 from tca_mj.files import write_whole
 
 FORMAT = 1
 KINDS = {"gait": ".json", "network": ".npz", "residual": ".npz"}
+
+
+def _steering(name: str, value: Any) -> tuple[float, ...]:
+    return row(name, value) if np.size(value) else ()
 
 
 class Policy(Protocol):
@@ -52,7 +58,7 @@ class Policy(Protocol):
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
-class Origin:
+class Origin(Checked):
     """Where a policy comes from.
 
     Attributes:
@@ -73,7 +79,7 @@ class Origin:
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
-class SavedPolicy:
+class SavedPolicy(Checked):
     """The contents of a policy's file; see the module for the kinds.
 
     Attributes:
@@ -92,20 +98,19 @@ class SavedPolicy:
     task: str
     origin: Origin
     gait: Gait | None = None
-    steering: tuple[float, ...] = ()
+    steering: Annotated[tuple[float, ...], _steering] = ()
     network: Network | None = None
-    bound: float = 0.0
+    bound: NotNegative = 0.0
     arguments: Mapping[str, Any] = field(default_factory=lambda: {"action": "power"})
 
     def __post_init__(self) -> None:
+        Checked.__post_init__(self)
         if self.gait is None and self.network is None:
-            raise ValueError("a policy must have a gait or a network, got neither")
+            raise ValueError("gait or network must be there, got neither")
         if self.gait is not None and len(self.steering) != self.gait.legs:
             raise ValueError(
-                f"steering must have {self.gait.legs} numbers, got {len(self.steering)}"
+                f"steering must have {self.gait.legs} numbers, got {shown(self.steering)}"
             )
-        if not np.isfinite((*self.steering, self.bound)).all():
-            raise ValueError(f"steering and bound must be finite, got {self.steering, self.bound}")
         if (self.bound > 0.0) != (self.kind == "residual"):
             raise ValueError(
                 f"bound must be above 0 K with gait and network, else 0, got {self.bound}"
@@ -118,6 +123,7 @@ class SavedPolicy:
             return "network"
         return "gait" if self.network is None else "residual"
 
+    @door
     def save(self, path: str | Path) -> Path:
         """Writes the file in one go: whoever reads it finds the old or the new one.
 
@@ -149,6 +155,7 @@ class SavedPolicy:
         np.savez(memory, allow_pickle=False, header=np.array(json.dumps(header)), **rows)
         return write_whole(path, memory.getvalue())
 
+    @door
     def to_onnx(self, path: str | Path) -> Path:
         """Writes the network as an ONNX file, see ``onnx.onnx_model``, in one go.
 
@@ -171,6 +178,7 @@ class SavedPolicy:
         return write_whole(Path(path), onnx_model(self.network, noted))
 
     @classmethod
+    @door
     def read(cls, path: str | Path) -> SavedPolicy:
         """Reads a file.
 
@@ -206,7 +214,8 @@ class SavedPolicy:
         except Exception as error:
             raise ValueError(f"{path} is no policy: {why(error)}") from error
 
-    def make(self, env: Any) -> Policy:
+    @door
+    def make(self, env: gym.Env[Any, Any]) -> Policy:
         """The policy, ready for an episode in an environment; errors as ``GaitPolicy.in_task``."""
         if self.gait is None:
             assert self.network is not None

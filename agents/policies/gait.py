@@ -5,16 +5,19 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
+from tca_mj.checks import Checked, Finite, NotNegative, Positive, Temperature, door, require_one_of
 from tca_mj.control import Gait, Thermostat
 from tca_mj.envs.table import Table
+from tca_mj.registry import ControlPeriod
 from tca_mj.tca import HeatSpec
 
 
 @dataclass(kw_only=True)
-class GaitPolicy:
+class GaitPolicy(Checked):
     """The power that makes the TCAs of legs as hot as a gait says, steered to a direction.
 
     It can act in every task with ``legs`` whose action is the power of their TCAs, leg by leg, and
@@ -31,33 +34,44 @@ class GaitPolicy:
         hottest: Temperature that corrections may not pass, unless the gait does [°C].
         control_period: Time between two actions [s].
         time: Time since the start [s].
+
+    Raises:
+        ValueError: If a field is not of its kind, the gait has an odd number of legs, or the
+            steering another number.
     """
 
     gait: Gait
-    steering: float | tuple[float, ...] = 0.0
+    steering: Finite | tuple[float, ...] = 0.0
     seen: Table
     heat: HeatSpec
-    max_power: float
-    hottest: float
-    control_period: float
-    time: float = 0.0
+    max_power: Positive
+    hottest: Temperature
+    control_period: ControlPeriod
+    time: NotNegative = 0.0
     phase = "gait"
 
     def __post_init__(self) -> None:
+        Checked.__post_init__(self)
+        if self.gait.legs % 2:
+            raise ValueError(f"gait must have legs by twos, got {self.gait.legs}")
+        if np.shape(self.steering) not in ((), (self.gait.legs,)):
+            raise ValueError(f"steering must have {self.gait.legs} numbers, got {self.steering}")
         self._thermostat = Thermostat(heat=self.heat, max_power=self.max_power)
         self._left = np.array([1.0, 0.0] * (self.gait.legs // 2), dtype=np.float64)
 
     @classmethod
-    def in_task(cls, env: Any, gait: Gait, steering: float | tuple[float, ...]) -> GaitPolicy:
+    @door
+    def in_task(
+        cls, env: gym.Env[Any, Any], gait: Gait, steering: float | tuple[float, ...]
+    ) -> GaitPolicy:
         """A gait in an environment.
 
         Raises:
             ValueError: If no gait can do the task, its legs are not those of the gait, or its
                 action is not the power of the TCAs.
         """
-        task = env.unwrapped
-        if task.heating != "power":
-            raise ValueError(f"action must be 'power' for a gait, got {task.heating!r}")
+        task: Any = env.unwrapped
+        require_one_of("action", task.heating, ("power",))
         if task.legs != gait.legs:
             raise ValueError(f"gait must have {task.legs} legs, got {gait.legs}")
         n = task.action.size

@@ -6,14 +6,16 @@ from collections.abc import Mapping
 from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
+import gymnasium as gym
 import numpy as np
 
 from tca_mj.agents.policies.files import KINDS, Policy, SavedPolicy
 from tca_mj.agents.policies.network import Network
 from tca_mj.agents.policies.preprocessing import Preprocessing
 from tca_mj.agents.policies.sb3_zip import Model
+from tca_mj.checks import door
 from tca_mj.envs.task import HEATINGS
 from tca_mj.hints import nearest
 from tca_mj.registry import find_task, make
@@ -22,8 +24,9 @@ ZIP = ".zip"  # of a model of Stable-Baselines3
 BEST = ("best.json", "best.npz", "best_model.zip")  # the last by its EvalCallback
 
 
+@door
 def load_policy(
-    source: str | Path, env: Any, preprocessing: Preprocessing | None = None
+    source: str | Path, env: gym.Env[Any, Any], preprocessing: Preprocessing | None = None
 ) -> Policy:
     """A policy from a file, ready to act in an environment.
 
@@ -51,13 +54,14 @@ def load_policy(
     saved = SavedPolicy.read(path)
     spec = env.spec
     if spec is not None and spec.id != saved.task.rpartition(":")[2]:
-        raise ValueError(f"{source} is a policy for {saved.task}, not for {spec.id}")
+        raise ValueError(f"source must be a policy for {spec.id}, got {source} for {saved.task}")
     require_arguments(saved.arguments, env)
     if saved.network is not None:
         _require_spaces(path, saved.network, 2 if saved.kind == "residual" else 0, env)
     return saved.make(env)
 
 
+@door
 def saved_policy(
     source: str | Path,
     task: str | None = None,
@@ -81,7 +85,7 @@ def saved_policy(
         require_untold(path, preprocessing)
         return SavedPolicy.read(path)
     if task is None:
-        raise ValueError(f"task must name what {path} was trained in, got none (--task)")
+        raise ValueError(f"task must name what {path} was trained in, got None (--task)")
     env = make(task, disable_env_checker=True, **(arguments or {}))
     try:
         return replace(read_zip(path, env, preprocessing), task=task)
@@ -89,7 +93,8 @@ def saved_policy(
         env.close()
 
 
-def require_arguments(arguments: Mapping[str, Any], env: Any) -> None:
+@door
+def require_arguments(arguments: Mapping[str, Any], env: gym.Env[Any, Any]) -> None:
     """Refuses an environment that was made with other arguments than a policy needs.
 
     Args:
@@ -109,6 +114,7 @@ def require_arguments(arguments: Mapping[str, Any], env: Any) -> None:
             raise ValueError(f"{name} must be {needed!r} for this policy, got {value!r}")
 
 
+@door
 def find(source: str | Path) -> Path:
     """The file of a policy.
 
@@ -142,7 +148,10 @@ def shipped() -> dict[str, Path]:
     return {path.stem: path for path in found if path.suffix in KINDS.values()}
 
 
-def read_zip(path: str | Path, env: Any, preprocessing: Preprocessing | None = None) -> SavedPolicy:
+@door
+def read_zip(
+    path: str | Path, env: gym.Env[Any, Any], preprocessing: Preprocessing | None = None
+) -> SavedPolicy:
     """A model as a policy for a task.
 
     Args:
@@ -155,11 +164,12 @@ def read_zip(path: str | Path, env: Any, preprocessing: Preprocessing | None = N
         ValueError: As ``Model.read``, if it is a model for other spaces, or if it has to be said
             whether observations were scaled.
     """
-    how, model, task = preprocessing or Preprocessing(), Model.read(path), env.unwrapped
+    task: Any = env.unwrapped
+    how, model = preprocessing or Preprocessing(), Model.read(path)
     _require_spaces(path, model.network, 0, env)
-    scaled = how.scaled
+    scaled, own = how.scaled, cast("Any", env.observation_space)
     if scaled is None:
-        own, by_table = env.observation_space, task.observation.scaled_space
+        by_table = task.observation.scaled_space
         plain, fits = (
             model.seen is not None and np.allclose(model.seen, [space.low, space.high], rtol=1e-5)
             for space in (own, by_table)
@@ -190,8 +200,8 @@ def _require_spaces(path: str | Path, network: Network, own: int, env: Any) -> N
     seen, acts = env.observation_space.shape[0], env.action_space
     if (network.inputs - own, network.outputs) != (seen, acts.shape[0]):
         raise ValueError(
-            f"{path} turns {network.inputs - own} numbers into {network.outputs}, the task has"
-            f" {seen} and {acts.shape[0]}"
+            f"source must turn {seen} numbers into {acts.shape[0]}, got {path} from"
+            f" {network.inputs - own} to {network.outputs}"
         )
     low, high = (-1.0, 1.0) if network.bounds is None else network.bounds
     if not (np.allclose(acts.low, low) and np.allclose(acts.high, high)):

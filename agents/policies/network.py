@@ -10,17 +10,16 @@ from typing import Annotated, Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from tca_mj.checks import Checked, NotNegative, number, require_one_of, within
+from tca_mj.checks import Checked, NotNegative, Numbers, Positive, require_one_of, within
 
 Floats: TypeAlias = NDArray[np.float32]
 
 
-def _positive_or_none(name: str, value: Any) -> None:
-    if value is not None:
-        number(name, value, above=0.0)
+def _floats32(name: str, value: Any) -> Floats:
+    return within(name, value).astype(np.float32)
 
 
-MaybePositive = Annotated[float | None, _positive_or_none]
+Singles = Annotated[Floats, _floats32]
 
 ACTIVATIONS: dict[str, Callable[[NDArray[np.float64]], NDArray[np.float64]]] = {
     "tanh": np.tanh,
@@ -62,17 +61,17 @@ class Network(Checked):
         ValueError: If shapes do not fit, numbers are not finite or a name is unknown.
     """
 
-    weights: tuple[Floats, ...]
-    biases: tuple[Floats, ...]
-    mean: NDArray[np.float64]
-    var: NDArray[np.float64]
-    clip: MaybePositive = 10.0
+    weights: tuple[Singles, ...]
+    biases: tuple[Singles, ...]
+    mean: Numbers
+    var: Numbers
+    clip: Positive | None = 10.0
     epsilon: NotNegative = 1e-8
     activation: Annotated[str, partial(require_one_of, choices=tuple(ACTIVATIONS))] = "tanh"
     squash: Annotated[str, partial(require_one_of, choices=SQUASHES)] = "clip"
-    limit: MaybePositive = None
-    units: Floats | None = None
-    bounds: Floats | None = None
+    limit: Positive | None = None
+    units: Singles | None = None
+    bounds: Singles | None = None
 
     def __post_init__(self) -> None:
         Checked.__post_init__(self)
@@ -90,11 +89,6 @@ class Network(Checked):
                     f"weights[{i}] must have the shape {(*bias.shape, *width)}, got {weight.shape}"
                 )
             width = bias.shape
-        for array in (*self.weights, *self.biases):
-            wrong = array.size - int(np.isfinite(array).sum())
-            if wrong:
-                raise ValueError(f"weights and biases must be finite, got {wrong} that are not")
-        within("mean", self.mean)
         within("var + epsilon", within("var", self.var, at_least=0.0) + self.epsilon, above=0.0)
         if self.units is not None:
             within("units", self.units, shape=(2, self.inputs))

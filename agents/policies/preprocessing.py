@@ -10,8 +10,7 @@ from typing import Any
 import numpy as np
 
 from tca_mj.agents.policies.archives import arrays, content_of, why
-from tca_mj.agents.policies.network import MaybePositive
-from tca_mj.checks import Checked, NotNegative, floats
+from tca_mj.checks import Checked, NotNegative, Positive, door, floats
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -30,10 +29,11 @@ class Statistics(Checked):
 
     mean: tuple[float, ...]
     var: tuple[float, ...]
-    clip: MaybePositive
+    clip: Positive | None
     epsilon: NotNegative
 
     @classmethod
+    @door
     def read(cls, path: str | Path, *, trust: bool = False) -> Statistics:
         """Reads ``mean``, ``var``, ``clip`` and ``epsilon`` of an ``.npz`` file, or a pickle.
 
@@ -69,7 +69,7 @@ class Statistics(Checked):
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
-class Preprocessing:
+class Preprocessing(Checked):
     """What became of an observation before a model saw it.
 
     Attributes:

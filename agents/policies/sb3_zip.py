@@ -24,7 +24,7 @@ from tca_mj.agents.policies.archives import LONGEST, Archive, content_of, tensor
 from tca_mj.agents.policies.files import Origin
 from tca_mj.agents.policies.network import Floats, Network
 from tca_mj.agents.policies.preprocessing import Statistics
-from tca_mj.checks import require_one_of, within
+from tca_mj.checks import door, require_one_of, within
 
 Doubles: TypeAlias = NDArray[np.float64]
 
@@ -70,6 +70,7 @@ class Model:
     origin: Origin
 
     @classmethod
+    @door
     def read(cls, path: str | Path) -> Model:
         """Reads a zip.
 
@@ -88,6 +89,7 @@ class Model:
                 f"{path} is no model of Stable-Baselines3 that can be read: {why(error)}"
             ) from error
 
+    @door
     def preprocessed(self, units: Floats | None, statistics: Statistics | None) -> Network:
         """The network on observations in the units of the task.
 

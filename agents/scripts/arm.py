@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tca_mj.checks import Checked, NotNegative, Positive, Temperature
 from tca_mj.envs.arm import OBSERVATION, ArmPickPlace
 from tca_mj.robots.arm import ArmSpec, arm
 from tca_mj.tca.spec import heat_of
@@ -26,7 +27,7 @@ _BENDING, _WRIST, _GRIPPER = slice(0, 3), 3, 4
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
-class PickAndPlaceGains:
+class PickAndPlaceGains(Checked):
     """What the script was tuned to, on the default arm.
 
     Attributes:
@@ -59,36 +60,39 @@ class PickAndPlaceGains:
             the silicone keeps the TCA warm for minutes [K].
         slipped: Depth of the object below the finger tips at which it counts as lost [m].
         phase_limit: Time after which any phase is given up for the next one [s].
+
+    Raises:
+        ValueError: If a number is not finite or negative, or a time 0.
     """
 
-    hottest: float = 160.0
-    settling: float = 0.6
-    averaging: float = 0.6
-    bend_rate: float = 2000.0
-    bend_now: float = 1500.0
-    brace: float = 0.55
-    wrist_slope: float = 45.0
-    opening_slope: float = 1e4
-    clearance: float = 5.5e-3
-    grasp_depth: float = 0.2
-    aligned: float = 1.0e-3
-    aligned_yaw: float = 0.07
-    over_cup: float = 6e-3
-    patience: float = 12.0
-    turning_back: float = 6.5
-    carry_height: float = 45e-3
-    drop_height: float = 27e-3
-    hover: float = 20e-3
-    climb_rate: float = 1.4
-    carry_rate: float = 0.8
-    calm: float = 0.8
-    cool: float = 2.0
-    slipped: float = 8e-3
-    phase_limit: float = 40.0
+    hottest: Temperature = 160.0
+    settling: Positive = 0.6
+    averaging: Positive = 0.6
+    bend_rate: NotNegative = 2000.0
+    bend_now: NotNegative = 1500.0
+    brace: NotNegative = 0.55
+    wrist_slope: NotNegative = 45.0
+    opening_slope: NotNegative = 1e4
+    clearance: NotNegative = 5.5e-3
+    grasp_depth: NotNegative = 0.2
+    aligned: NotNegative = 1.0e-3
+    aligned_yaw: NotNegative = 0.07
+    over_cup: NotNegative = 6e-3
+    patience: Positive = 12.0
+    turning_back: Positive = 6.5
+    carry_height: NotNegative = 45e-3
+    drop_height: NotNegative = 27e-3
+    hover: NotNegative = 20e-3
+    climb_rate: NotNegative = 1.4
+    carry_rate: NotNegative = 0.8
+    calm: NotNegative = 0.8
+    cool: NotNegative = 2.0
+    slipped: NotNegative = 8e-3
+    phase_limit: Positive = 40.0
 
 
 @dataclass
-class PickAndPlace:
+class PickAndPlace(Checked):
     """The scripted policy of ``TCA/ArmPickPlace-v0``: an observation in, an action out.
 
     Attributes:
@@ -103,6 +107,7 @@ class PickAndPlace:
     gains: PickAndPlaceGains = field(default_factory=PickAndPlaceGains)
 
     def __post_init__(self) -> None:
+        Checked.__post_init__(self)
         self._heat = heat_of([tca.spec for tca in arm(self.arm_spec).tcas])
         self.reset()
 

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tca_mj.agents.scripts.tetrapod import CRAWL, SHIMMY, WALK
+from tca_mj.checks import Checked, Edge, door
 from tca_mj.control import Gait, Thermostat
 from tca_mj.envs.course import OBSERVATION, Places, TetrapodCourse
 from tca_mj.robots.tetrapod import SPINES
@@ -47,7 +48,7 @@ _REACHING = (165.0, 165.0, _OFF)  # a leg lifted and bent forward
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
-class Go:
+class Go(Checked):
     """Move with a gait until the middle of the body is at ``until`` [m].
 
     Attributes:
@@ -62,12 +63,12 @@ class Go:
     name: str
     gait: Gait | tuple[Gait, ...]
     until: float
-    patience: float = math.inf
+    patience: Edge = math.inf
     steers: bool = False
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
-class Bend:
+class Bend(Checked):
     """Change the shape of the body; legs that do not step are left cold.
 
     Attributes:
@@ -88,6 +89,7 @@ class Bend:
     enough: float | None = None
 
 
+@door
 def stages(places: Places) -> tuple[Go | Bend, ...]:
     """The course, stage by stage.
 

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tca_mj.checks import Checked
 from tca_mj.control.morph import ClosedLoop, Measurement, MorphSequence, MorphState
 from tca_mj.control.pi import PiSpec
 from tca_mj.envs.morph import OBSERVATION, MorphModule
@@ -50,7 +51,7 @@ def _lumped(spec: MorphingSpec) -> LumpedModule:
 
 
 @dataclass
-class MorphPolicy:
+class MorphPolicy(Checked):
     """Soften, morph, hold, harden, release: an observation in, an action out.
 
     It looks at the thermistor, the TCA's resistance and the commanded angle, and at nothing else
@@ -68,6 +69,7 @@ class MorphPolicy:
     progress: MorphState | None = None
 
     def __post_init__(self) -> None:
+        Checked.__post_init__(self)
         self._fit = calibrate(self.module_spec)
         self.sequence = MorphSequence(
             drive=ClosedLoop(pi=self.gains, angle_of=self.angle_of),

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tca_mj.checks import Checked, NotNegative, Positive, Temperature
 from tca_mj.control import Thermostat
 from tca_mj.envs.hanging import StaticTip
 from tca_mj.envs.reach import ACTION, OBSERVATION, BendReach
@@ -15,7 +16,7 @@ from tca_mj.modules.bending import BendingSpec
 
 
 @dataclass
-class ReachPolicy:
+class ReachPolicy(Checked):
     """Temperatures from a model at rest, corrected by where the tip is: observation in, action out.
 
     Its own, nominal module tells at which temperatures the tip would rest at the target, and how
@@ -32,13 +33,14 @@ class ReachPolicy:
     """
 
     module_spec: BendingSpec = field(default_factory=BendingSpec)
-    averaging: float = 1.0
-    near: float = 10.0
-    hottest: float = BendReach.hot_temperature - 5.0
+    averaging: Positive = 1.0
+    near: NotNegative = 10.0
+    hottest: Temperature = BendReach.hot_temperature - 5.0
     phase = "reach"
     _dt = BendReach.control_period
 
     def __post_init__(self) -> None:
+        Checked.__post_init__(self)
         self._static = StaticTip(self.module_spec)
         self._heat = self._static.sim.bank.heat
         self._thermostat = Thermostat(heat=self._heat, max_power=BendReach.max_power)

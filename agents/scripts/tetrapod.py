@@ -11,6 +11,7 @@ from types import MappingProxyType
 from typing import Any
 
 from tca_mj.agents.policies.gait import GaitPolicy
+from tca_mj.checks import door, require_one_of
 from tca_mj.control import Gait
 from tca_mj.envs.stance import LEG_TCAS
 from tca_mj.envs.tetrapod import OBSERVATION, TetrapodGait
@@ -41,6 +42,7 @@ GAITS = MappingProxyType({"crawl": CRAWL, "walk": WALK, "shimmy": SHIMMY})  # by
 STEERING = {"crawl": 600.0, "walk": 600.0, "shimmy": 0.0}
 
 
+@door
 def gait_policy(gait: str, robot: TetrapodSpec | None = None) -> GaitPolicy:
     """The scripted policy of a task.
 
@@ -59,8 +61,7 @@ def gait_policy(gait: str, robot: TetrapodSpec | None = None) -> GaitPolicy:
         >>> gait_policy("walk").act(observation).shape
         (12,)
     """
-    if gait not in GAITS:
-        raise ValueError(f"gait must be one of {list(GAITS)}, got {gait!r}")
+    require_one_of("gait", gait, list(GAITS))
     heat = heat_of([tca.spec for tca in tetrapod(robot or TetrapodSpec()).tcas[:LEG_TCAS]])
     return GaitPolicy.told_of(TetrapodGait, OBSERVATION, heat, GAITS[gait], STEERING[gait])
 

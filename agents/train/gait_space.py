@@ -5,11 +5,13 @@ from __future__ import annotations
 import math
 from collections import defaultdict
 from dataclasses import dataclass, replace
-from typing import Any
+from functools import partial
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from tca_mj.checks import Checked, door, number, within
 from tca_mj.control import Gait
 
 Array = NDArray[np.float64]
@@ -27,7 +29,7 @@ _TCAS = 3
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
-class GaitSpace:
+class GaitSpace(Checked):
     """Gaits of four legs with three TCAs whose left and right legs share their figures.
 
     Every number of ``encode`` lies between 0 and 1: the period; the offsets of all legs but the
@@ -37,16 +39,17 @@ class GaitSpace:
 
     Attributes:
         centre: The gait about which offsets and starts are counted.
-        hottest: Largest temperature of a gait [°C].
+        hottest: Largest temperature of a gait, above 60 up to 400 °C [°C].
 
     Raises:
         ValueError: If it has not four legs with three TCAs, or is not the same left and right.
     """
 
     centre: Gait
-    hottest: float
+    hottest: Annotated[float, partial(number, above=COOLEST, at_most=400.0, unit="°C")]
 
     def __post_init__(self) -> None:
+        Checked.__post_init__(self)
         if self.centre.table("start").shape != (4, _TCAS):
             raise ValueError(
                 f"centre must have 4 legs with {_TCAS} TCAs, got {self.centre.table('start').shape}"
@@ -67,11 +70,13 @@ class GaitSpace:
         return tuple(found)
 
     def fold(self, point: Array) -> Array:
-        """Brings any numbers into the cube: cyclic ones go round, others are reflected."""
+        """Brings finite numbers into the cube: cyclic ones go round, others are reflected."""
+        point = within("point", point, shape=(len(self.names),))
         cyclic = np.array(["offset" in name or ".start" in name for name in self.names])
-        mirrored = 1.0 - np.abs(np.asarray(point) % 2.0 - 1.0)
-        return np.where(cyclic, np.asarray(point) % 1.0, mirrored)
+        mirrored = 1.0 - np.abs(point % 2.0 - 1.0)
+        return np.where(cyclic, point % 1.0, mirrored)
 
+    @door
     def encode(self, gait: Gait, steering: tuple[float, ...]) -> Array:
         """The point of a gait, shape (n,); what is out of bounds goes to the nearest bound.
 
@@ -80,9 +85,10 @@ class GaitSpace:
             steering: One number per leg, those of a pair the same [K/rad].
 
         Raises:
-            ValueError: If left and right differ.
+            ValueError: If left and right differ, or there are not four numbers.
         """
         replace(self, centre=gait)
+        within("steering", steering, shape=(4,))
         if any(steering[pair][0] != steering[pair][1] for pair in _PAIRS.values()):
             raise ValueError(f"steering must be the same left and right, got {steering}")
         offset, start = np.array(gait.offset), gait.table("start")
@@ -97,7 +103,8 @@ class GaitSpace:
             hot = gait.table("hot")[i]
             point += [_share(duty, *DUTY) for duty in gait.table("duty")[i]]
             point += [_share(value, COOLEST, self.hottest) for value in hot]
-            point += list((gait.table("warm")[i] - COLD) / (hot - COLD))
+            warm = gait.table("warm")[i] - COLD  # none where hot is cold, too
+            point += list(np.divide(warm, hot - COLD, out=np.zeros(_TCAS), where=hot > COLD))
             point.append(_share(steering[i], *STEERING))
         return np.clip(point, 0.0, 1.0)
 
@@ -107,9 +114,7 @@ class GaitSpace:
         Raises:
             ValueError: If the point has the wrong length or numbers out of 0 to 1.
         """
-        point = np.asarray(point, dtype=np.float64)
-        if point.shape != (len(self.names),) or not ((point >= 0.0) & (point <= 1.0)).all():
-            raise ValueError(f"point must be {len(self.names)} numbers from 0 to 1, got {point}")
+        point = within("point", point, at_least=0.0, at_most=1.0, shape=(len(self.names),))
         offset = np.array(self.centre.offset)
         offset[1:] = (offset[1:] + point[1:4] - 0.5) % 1.0
         tables: dict[str, list[tuple[float, ...]]] = defaultdict(list)

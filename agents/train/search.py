@@ -23,11 +23,12 @@ from tca_mj.agents.output import write_csv
 from tca_mj.agents.policies import SavedPolicy
 from tca_mj.agents.policies.actors import TROT, first_gait
 from tca_mj.agents.progress import progress_bar
+from tca_mj.agents.train.config import Few, LearnerSeed, Many, Steps
 from tca_mj.agents.train.gait_score import Headway, Reference, Trial, run_trial, score
 from tca_mj.agents.train.gait_space import GaitSpace
 from tca_mj.agents.train.runs import CURVE, RunFolder, drawn
-from tca_mj.agents.workers import Workers
-from tca_mj.checks import Checked, Count, number, require_count, whole
+from tca_mj.agents.workers import Processes, Workers
+from tca_mj.checks import Checked, door, number, whole
 from tca_mj.control import Gait
 from tca_mj.files import claimed
 from tca_mj.registry import task_class
@@ -44,41 +45,42 @@ class SearchConfig(Checked):
 
     Attributes:
         task: Gymnasium id of a task with four legs that a gait can drive.
-        steps: Control steps of all episodes together after which no generation begins.
-        seed: Seed of everything that is drawn.
+        steps: Control steps of all episodes together after which no generation begins, up to a
+            billion.
+        seed: Seed of everything that is drawn, below 2**32.
         start: Where the search begins: ``scripted``, ``trot``, or a policy's file or name.
         sigma: First step size, the cube of all gaits having edges of 1 [1]. With 0.03 one in five
             gaits about the scripted walk is better than it, with 0.1 none.
-        population: Gaits per generation.
-        episodes: Episodes per gait, the same for all of a generation.
+        population: Gaits per generation, 5 to 10 000.
+        episodes: Episodes per gait, the same for all of a generation, up to 10 000.
         randomise: Spread of the robots in them, a share [1].
         settling: Time of each episode that is not judged, as in ``Trial`` [s].
         window: Time that is judged [s].
         validate_every: Generations after which the middle of the search is judged, by the same
             episodes each time; the best in these is what the search finds.
-        validation_episodes: How many these are.
+        validation_episodes: How many these are, up to 10 000.
 
     Raises:
         ValueError: If a field is out of range.
     """
 
     task: str
-    steps: Count = 150_000
-    seed: int = 0
+    steps: Steps = 150_000
+    seed: LearnerSeed = 0
     start: str = "scripted"
     sigma: Annotated[float, partial(number, above=0.0, at_most=0.5)] = 0.03
-    population: Annotated[int, partial(whole, at_least=5)] = 14
-    episodes: Count = 1
+    population: Annotated[int, partial(whole, at_least=5, at_most=10_000)] = 14
+    episodes: Few = 1
     randomise: Annotated[float, partial(number, at_least=0.0, at_most=0.5)] = 0.2
     settling: Annotated[float, partial(number, at_least=0.0, at_most=20.0, unit="s")] = 10.0
     window: Annotated[float, partial(number, at_least=0.1, at_most=25.0, unit="s")] = 20.0
-    validate_every: Count = 8
-    validation_episodes: Count = 8
+    validate_every: Many = 8
+    validation_episodes: Few = 8
 
     def __post_init__(self) -> None:
+        Checked.__post_init__(self)
         if task_class(self.task).legs != len(TROT):
             raise ValueError(f"task must have four legs that a gait can drive, got {self.task!r}")
-        Checked.__post_init__(self)
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -102,8 +104,10 @@ class SearchState:
     rows: tuple[dict[str, float | int], ...] = ()
 
 
+@door
 def search(
-    config: SearchConfig, out: Path, *, workers: int = 2, command: str = "", progress: bool = True
+    config: SearchConfig, out: Path, *, workers: Processes = 2, command: str = "",
+    progress: bool = True,
 ) -> SavedPolicy:
     """Searches for a gait, or goes on with the search that ``out`` holds.
 
@@ -127,7 +131,6 @@ def search(
         OSError: If something cannot be written.
         KeyboardInterrupt: As it came, after everything was written.
     """
-    require_count(workers=workers)
     gait, steering = first_gait(config.task, config.start)
     space = GaitSpace(centre=gait, hottest=task_class(config.task).hot_temperature)
     point = space.encode(gait, steering)

@@ -19,7 +19,7 @@ from tca_mj.record.render import Closing, Offscreen, Pixels, Watched, colour_ten
 
 # A player shows no more; and the slowest film shows each step, the fastest an hour in a second.
 _Fps = Annotated[float, partial(number, at_least=1.0, at_most=240.0)]
-_Speed = Annotated[float, partial(number, at_least=1e-3, at_most=3600.0)]
+FilmSpeed = Annotated[float, partial(number, at_least=1e-3, at_most=3600.0)]
 
 
 class Film(Closing):
@@ -31,7 +31,7 @@ class Film(Closing):
 
     @door
     def __init__(
-        self, simulation: Watched, path: str | Path, *, fps: _Fps = 30.0, speed: _Speed = 1.0,
+        self, simulation: Watched, path: str | Path, *, fps: _Fps = 30.0, speed: FilmSpeed = 1.0,
         width: Pixels = 960, height: Pixels = 720, camera: int | str | mujoco.MjvCamera = -1,
     ) -> None:  # fmt: skip
         """Prepares the file; OpenGL is set up by the first frame.
