@@ -27,17 +27,18 @@ INTERNAL = {
         "forks": "*", "hints": "*", "lazy": "*", "machine": "*", "pages": "*", "quadrature": "*",
         "routes": "require_route", "testing": "*",
     },
+    "tca_mj.smp": {"damage": "damaging", "fixing": "with_glass", "heater": "heated"},
     "tca_mj.tca": {
         "arrays": "*", "laws.castigliano": "*", "laws.coil": "*", "laws.love": "*",
         "laws.model": "*", "laws.rod": "Point require_domain sheared",
         "laws.roots": "bracketed closed", "laws.table": "coil_alone evaluate solved",
-        "moduli": "softened", "spec": "heat_of", "thermal": "bare_step require_bare",
+        "moduli": "softened", "spec": "heat_of", "thermal": "BareStep require_bare",
     },
     "tca_mj.rod": {
         "deadload": "*", "energy": "*", "lie": "*", "problem": "StaticProblem asked",
         "sections": "*", "shooting": "*", "solving": "*",
     },
-    "tca_mj.model": {"curves": "*", "smooth": "*", "spines": "*", "surface": "*"},
+    "tca_mj.model": {"curves": "*", "smooth": "*", "spines": "*", "sums": "*", "surface": "*"},
     "tca_mj.robots": {"tetrapod": "add_rail attach_legs dress route_spine_tca trunk"},
     "tca_mj.record": {
         "layout": "*", "plots": "event_rows save_figure", "render": "Closing", "shapes": "*",
