@@ -120,7 +120,7 @@ def test_an_option_that_the_task_refuses_returns_2(
 ) -> None:
     wrong = ["--option", "object=hammer", "--out", str(tmp_path)]
     assert cli.main(["demo", "pick-and-place", *wrong]) == 2
-    assert "object must be one of ['pcb', 'screwdriver'], got 'hammer'" in capsys.readouterr().err
+    assert "object must be one of ('pcb', 'screwdriver'), got 'hammer'" in capsys.readouterr().err
 
 
 def test_list_names_every_task_with_its_spaces(capsys: pytest.CaptureFixture[str]) -> None:

@@ -72,7 +72,7 @@ def test_bad_lengths_are_refused(length):
 @pytest.mark.parametrize(
     ("temperature", "kind", "match"),
     [
-        (math.nan, {}, "temperature must be finite .* got nan"),
+        (math.nan, {}, "temperature must be finite, got nan"),
         (-300.0, {}, "temperature must be .* above -273.15 and below 260 °C, got -300.0"),
         (260.0, {}, "temperature must be .* below 260 °C, got 260.0"),
         ([25.0, 30.0], {}, "temperature must be one finite number"),

@@ -126,7 +126,7 @@ def test_at_rest_no_rounding_decides_whether_a_tca_is_taut(law):
     def first_step(error):
         sim = simulation(law=law)
         rest = sim.bank.pull(sim.tca, sim.length)
-        sim._hand_over(replace(rest, tension=rest.tension + error))
+        sim._hand_over(rest._replace(tension=rest.tension + error))
         mujoco.mj_step(sim.model, sim.data)
         return sim.data.qpos.copy()
 
@@ -221,7 +221,7 @@ def test_robots_use_the_surface_and_the_rod_where_there_is_none():
     """Steep and soft in torsion: that coil's own tension falls with length."""
     assert simulation().bank.law == "surface"
     assert simulation(law="rod").bank.law == "rod"
-    with pytest.raises(ValueError, match="law must be 'rod' or 'surface', got 'table'"):
+    with pytest.raises(ValueError, match=r"law must be one of .* or a Callable, got 'table'"):
         simulation(law="table")
     part = bending_module()
     fibre = FibreSpec(radius=0.2e-3, young=7e9, shear=0.1e9)
@@ -330,8 +330,8 @@ def test_a_tca_outside_of_its_law_is_a_divergence(stretch):
         (np.zeros(3), 0.11, r"duration must be a positive multiple of tca_period 0\.02 s, got 0"),
         (np.zeros(3), 0.0, r"duration must be a positive multiple .*, got 0\.0"),
         (np.zeros(3), -0.1, r"duration must be a positive multiple .*, got -0\.1"),
-        (np.zeros(3), math.nan, r"duration must be a positive multiple .*, got nan"),
-        (np.zeros(3), math.inf, r"duration must be a positive multiple .*, got inf"),
+        (np.zeros(3), math.nan, "duration must be finite and at most 2000 s, got nan"),
+        (np.zeros(3), math.inf, "duration must be finite and at most 2000 s, got inf"),
     ],
 )
 def test_a_bad_step_is_refused_and_changes_nothing(power, duration, message):
@@ -345,14 +345,14 @@ def test_a_bad_step_is_refused_and_changes_nothing(power, duration, message):
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"timestep": 0.0}, r"timestep must be finite and above 0 s, got 0\.0"),
-        ({"timestep": -1e-3}, r"timestep must be finite and above 0 s, got -0\.001"),
-        ({"timestep": math.nan}, "timestep must be finite and above 0 s, got nan"),
+        ({"timestep": 0.0}, r"timestep must be finite and at least 1e-06 .* s, got 0\.0"),
+        ({"timestep": -1e-3}, r"timestep must be finite and at least 1e-06 .*, got -0\.001"),
+        ({"timestep": math.nan}, "timestep must be finite and at least 1e-06 .* got nan"),
         ({"timestep": 3e-3}, r"tca_period must be a positive multiple .* 0\.003 s, got 0\.02"),
-        ({"tca_period": 0.0}, r"tca_period must be a positive multiple .*, got 0\.0"),
-        ({"tca_period": math.nan}, "tca_period must be a positive multiple .*, got nan"),
-        ({"ambient": -300.0}, r"ambient must be .* above -273\.15, got -300\.0"),
-        ({"ambient": math.nan}, "ambient must be finite and above .*, got nan"),
+        ({"tca_period": 0.0}, r"tca_period must be finite and above 0, got 0\.0"),
+        ({"tca_period": math.nan}, "tca_period must be finite and above 0, got nan"),
+        ({"ambient": -300.0}, r"ambient must be finite and at least -40 .* °C, got -300\.0"),
+        ({"ambient": math.nan}, "ambient must be finite and at least -40 .*, got nan"),
     ],
 )
 def test_a_bad_simulation_is_refused(options, message):
@@ -402,5 +402,5 @@ def test_at_rest_nothing_moves_whatever_the_supply_takes():
 
 
 def test_what_cannot_be_kept_is_no_rest():
-    with pytest.raises(ValueError, match="temperature must be finite and at least"):
+    with pytest.raises(ValueError, match="temperature must be at least that of the surroundings"):
         simulation().rest([20.0, 25.0, 25.0], warming=0.0)

@@ -302,10 +302,10 @@ def test_a_beam_has_two_directions(envs):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ({"gait": "gallop"}, r"gait must be one of \['crawl', 'walk', 'shimmy'\], got 'gallop'"),
+        ({"gait": "gallop"}, r"gait must be one of \('crawl', 'walk', 'shimmy'\), got 'gallop'"),
         ({"render_mode": "human"}, "render_mode must be one of .None, .* got 'human'"),
         ({"camera": "back"}, "camera must be one of .* got 'back'"),
-        ({"body": "soft"}, r"body must be one of \['rigid', 'elastic', 'fine'\], got 'soft'"),
+        ({"body": "soft"}, r"body must be one of \('rigid', 'elastic', 'fine'\), got 'soft'"),
         ({"size": (0, 10)}, r"size\[0\] must be at least 1, got 0"),
         ({"timestep": 3e-3}, r"timestep must be 0\.1 s over a whole number, got 0\.003"),
     ],
