@@ -33,11 +33,14 @@ def robot_of(task: str, design: Mapping[str, Any]) -> dict[str, Any]:
 
 @door
 def designed(spec: Any, design: Mapping[str, Any]) -> Any:
-    """A specification with other figures; errors as ``robot_of``.
+    """A specification with other figures.
 
     Args:
         spec: The specification, which stays as it is.
         design: Values by path, such as ``leg.rod_diameter``.
+
+    Raises:
+        ValueError: If it is no specification, or as ``robot_of``.
     """
     if not is_dataclass(spec) or isinstance(spec, type):
         raise ValueError(f"spec must be a specification, got {shown(spec)}")

@@ -43,9 +43,9 @@ _SHORT.maxother, _SHORT.maxstring, _SHORT.maxlist, _SHORT.maxtuple = 160, 80, 8,
 
 
 def shown(value: Any) -> str:
-    """A value as a message shows it: never longer than a few lines."""
+    """A value as a message shows it, short and on one line."""
     try:
-        return _SHORT.repr(value)
+        return " ".join(_SHORT.repr(value).split())
     except ValueError:  # Python does not write whole numbers of thousands of digits
         return f"a whole number of {value.bit_length()} bits"
 

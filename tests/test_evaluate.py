@@ -189,14 +189,14 @@ def WELDED(task):
     ("wrong", "message"),
     [
         ({"task": "TCA/Nothing-v0"}, r"task must be one of \['TCA/ArmPickPlace-v0'"),
-        ({"model": "fine"}, r"model must be one of \('used',\) for TCA/BendReach-v0, got 'fine'"),
+        ({"model": "fine"}, r"model must be one of \('used',\), got 'fine'"),
         (
             {"task": WALKING, "model": "coarse"},
-            r"model must be one of \('used', 'legs', 'fine'\) for .*, got 'coarse'",
+            r"model must be one of \('used', 'legs', 'fine'\), got 'coarse'",
         ),
         ({"randomise": 0.6}, "randomise must be finite and at least 0 and at most 0.5, got 0.6"),
         ({"episodes": 0}, "episodes must be at least 1, got 0"),
-        ({"seed": -1}, "seed must be a whole number of at least 0, got -1"),
+        ({"seed": -1}, "seed must be at least 0, got -1"),
         ({"steps": 0}, "steps must be at least 1, got 0"),
     ],
 )
@@ -211,7 +211,7 @@ def test_an_unknown_policy_is_said_before_anything_runs(tmp_path):
     with pytest.raises(FileNotFoundError, match=r"none of best\.json, best\.npz"):
         evaluate(replace(SHORT, policy=str(tmp_path)), out=tmp_path / "new", progress=False)
     saved(tmp_path)
-    with pytest.raises(ValueError, match="is a policy for TCA/TetrapodWalk-v0"):
+    with pytest.raises(ValueError, match="must be a policy for TCA/BendReach-v0, got "):
         evaluate(replace(SHORT, policy=str(tmp_path)), out=tmp_path / "new", progress=False)
     with pytest.raises(ValueError, match="workers must be at least 1, got 0"):
         evaluate(SHORT, workers=0)

@@ -124,7 +124,7 @@ def test_wrong_files_are_refused_by_name(env, tmp_path):
         load_policy("nobody", env)
     path = POLICIES["gait"].save(tmp_path / "walk.json")
     other = gym.make("TCA/TetrapodCrawl-v0", action="power")
-    with pytest.raises(ValueError, match="for TCA/TetrapodWalk-v0, not for TCA/TetrapodCrawl-v0"):
+    with pytest.raises(ValueError, match="must be a policy for TCA/TetrapodCrawl-v0, got .*Walk"):
         load_policy(path, other)
     header = json.loads(path.read_text())
     for change, message in (

@@ -260,7 +260,7 @@ def test_models_for_other_spaces_are_refused(bare: Path) -> None:
     env = gym.make(TASK)
     count = (env.observation_space.shape or ())[0]
     reach = gym.make("TCA/BendReach-v0")
-    with pytest.raises(ValueError, match=r"turns 9 numbers into 3, the task has \d\d and 3"):
+    with pytest.raises(ValueError, match=r"must turn \d\d numbers into 3, got .* from 9 to 3"):
         load_policy(bare, reach)
     untrained(PPO, Empty(env.observation_space, WIDE), policy_kwargs=small(8)).save(bare)
     with pytest.raises(ValueError, match="must have the task's bounds of actions"):
@@ -350,7 +350,7 @@ FIRST = "mlp_extractor__policy_net__0__weight"
 BROKEN = {
     "a tensor that is not finite": (
         lambda path: {"policy_pth": with_state(path, **{FIRST: torch.full((8, 9), np.nan)})},
-        "weights and biases must be finite, got 72 that are not"),
+        r"weights\[0\] must be finite"),
     "shapes that do not fit": (
         lambda path: {"policy_pth": with_state(path, **{FIRST: torch.zeros(7, 9)})},
         "weights"),
