@@ -346,6 +346,8 @@ class Simulation:
     def bend(self, *chains: str) -> float:
         """Angle by which the end of a chain is turned from its base, beyond half a turn too [rad].
 
+        Of what has diverged it is not a number.
+
         Args:
             *chains: Its name; of several, each standing on the one before, the end of the last is
                 meant, and the base of the first.
@@ -361,7 +363,8 @@ class Simulation:
             for member in (self.chains[name] for name in chains)
             for piece in range(member.nodes + 1)
         ]
-        return bend(self.data.xmat[bodies].reshape(-1, 3, 3)[:, :, 2])
+        axes = self.data.xmat[bodies].reshape(-1, 3, 3)[:, :, 2]
+        return bend(axes) if np.isfinite(axes).all() else math.nan
 
     @property
     def motors(self) -> tuple[str, ...]:

@@ -47,6 +47,9 @@ def everything(sim: Simulation) -> dict[str, bytes]:
         if is_dataclass(value):
             for field in fields(value):
                 add(f"{name}.{field.name}", getattr(value, field.name))
+        elif hasattr(value, "_asdict"):
+            for part, each in value._asdict().items():
+                add(f"{name}.{part}", each)
         else:
             found[name] = value
 
@@ -179,7 +182,7 @@ def test_what_is_refused_moves_nobody():
     good = Drive(command=np.zeros(sims[0].n))
     before = [everything(sim) for sim in sims]
     for given, duration, complaint in (
-        ([good], 0.1, "drives must be 2"),
+        ([good], 0.1, "drives must be a list of 2"),
         ([good, good], 0.03, "multiple of tca_period"),
         ([good, Drive(command=np.full(sims[0].n, -1.0))], 0.1, "at least 0 W"),
         ([good, Drive(command=np.zeros(1))], 0.1, "shape"),

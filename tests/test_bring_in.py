@@ -23,7 +23,7 @@ from tca_mj.envs import viewer
 from tca_mj.machine import how_to_install
 
 ROOT = Path(__file__).parent.parent
-NOD = "own_task:Example/Nod-v0"
+NOD = "own_task:Example/Turn-v0"
 MADE = {"action": "power", "control_period": 0.2}
 TOLD = ["--action", "power", "--control-period", "0.2"]
 REACH = "TCA/BendReach-v0"

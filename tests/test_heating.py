@@ -132,11 +132,11 @@ def test_a_control_period_can_be_any_number_of_updates(period):
 
 def test_who_acts_by_power_refuses_temperatures():
     env = make(WALKING, disable_env_checker=True)
-    with pytest.raises(ValueError, match="action must be 'power'"):
+    with pytest.raises(ValueError, match="action must be .*'power'"):
         scripted(env)
-    with pytest.raises(ValueError, match="action must be 'power'"):
+    with pytest.raises(ValueError, match="action must be .*'power'"):
         GaitPolicy.in_task(env, WALK, (0.0,) * 4)
-    with pytest.raises(ValueError, match="action must be 'power'"):
+    with pytest.raises(ValueError, match="action must be .*'power'"):
         CourseWalker(bare("TCA/TetrapodCourse-v0"))
     with pytest.raises(ValueError, match=r"action must be one of \['temperature', 'power'\]"):
         BendReach(action="voltage")

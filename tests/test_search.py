@@ -73,7 +73,7 @@ def test_a_lopsided_gait_is_no_centre():
         GaitSpace(centre=lopsided, hottest=172.0)
     with pytest.raises(ValueError, match="steering must be the same left and right"):
         GaitSpace(centre=WALK, hottest=172.0).encode(WALK, (1.0, 2.0, 3.0, 3.0))
-    with pytest.raises(ValueError, match="point must be 28 numbers from 0 to 1"):
+    with pytest.raises(ValueError, match="point must be finite and at least 0 and at most 1"):
         GaitSpace(centre=WALK, hottest=172.0).decode(np.full(28, 1.5))
 
 

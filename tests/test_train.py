@@ -308,7 +308,7 @@ def test_impossible_settings_are_refused(change, message):
     [
         (OnPolicy, {"gamma": 1.1}, "gamma must be finite and above 0"),
         (OnPolicy, {"n_steps": 0}, "n_steps must be"),
-        (OffPolicy, {"hidden": ()}, "hidden must be widths"),
+        (OffPolicy, {"hidden": ()}, "hidden must be 1 to 16 widths"),
         (OffPolicy, {"tau": 0.0}, "tau must be"),
     ],
 )
