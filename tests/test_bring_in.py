@@ -46,8 +46,8 @@ def test_it_is_evaluated_and_shown_as_it_was_trained(nod: Path, capsys: Any) -> 
     assert cli.main([*command, *TOLD]) == 0
     summary = json.loads(Path("e/summary.json").read_text())
     assert summary["settings"]["arguments"] == MADE
-    # Five steps of 0.2 s at the full power of 2 W.
-    assert summary["episodes"][0]["energy"] == pytest.approx(2.0, rel=1e-6)
+    # Five steps of 0.2 s at the full power of nine TCAs, 2 W each.
+    assert summary["episodes"][0]["energy"] == pytest.approx(18.0, rel=1e-6)
     demo = ["demo", "--policy", str(nod), "--task", NOD, "--no-video", "--out", "d"]
     assert cli.main([*demo, *TOLD]) in (0, 1)
     assert json.loads(Path("d/summary.json").read_text())["policy"] == "nod.zip"

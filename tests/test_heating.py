@@ -138,7 +138,7 @@ def test_who_acts_by_power_refuses_temperatures():
         GaitPolicy.in_task(env, WALK, (0.0,) * 4)
     with pytest.raises(ValueError, match="action must be .*'power'"):
         CourseWalker(bare("TCA/TetrapodCourse-v0"))
-    with pytest.raises(ValueError, match=r"action must be one of \['temperature', 'power'\]"):
+    with pytest.raises(ValueError, match=r"action must be one of .'temperature', 'power'."):
         BendReach(action="voltage")
     for id in IDS:
         assert scripted(make(id, **task_class(id).scripted_arguments)) is not None
