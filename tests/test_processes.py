@@ -58,7 +58,8 @@ def test_a_signal_ends_a_command_that_keeps_what_is_finished(sent, code, tmp_pat
                "--workers", "2", "--out", str(tmp_path)]  # fmt: skip
     run = started("-m", "tca_mj.cli", *command)
     episodes, deadline = tmp_path / EPISODES, time.monotonic() + PATIENCE
-    while not (episodes.is_file() and episodes.stat().st_size):
+    # The first of two lines is on the disk: one that a signal finds half-way is taken back.
+    while not (episodes.is_file() and episodes.read_bytes().count(b"\n") > 1):
         assert run.poll() is None and time.monotonic() < deadline
         time.sleep(0.02)
     for name in sent:
