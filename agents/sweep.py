@@ -13,19 +13,14 @@ import itertools
 import json
 import math
 import os
-import secrets
-import shutil
-import signal
-import sys
-import tempfile
-import threading
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager, suppress
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, fields, replace
 from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
+from tca_mj.agents.cluster import cluster
 from tca_mj.agents.evaluate import METRICS, Evaluation, cell, evaluate, label
 from tca_mj.agents.output import read_json, write_csv, write_json
 from tca_mj.agents.progress import progress_bar
@@ -38,9 +33,6 @@ from tca_mj.pages import table
 TRIALS, RESULT = "trials", "result.json"
 TABLE, PAGE, ABOUT = "results.csv", "results.md", "sweep.json"
 ALGORITHMS = ("cma", "ppo", "sac", "td3")
-
-# What Ray is told: not to report its use, to leave Ctrl-C to us.
-_RAY = {"RAY_USAGE_STATS_ENABLED": "0", "TUNE_DISABLE_SIGINT_HANDLER": "1"}
 
 Value = float | int | str
 MOST_TRIALS = 10_000
@@ -193,7 +185,8 @@ def run_sweep(
         ImportError: If Ray is not installed.
         FileNotFoundError: If there is no such policy.
         ConnectionError: If there is no cluster at ``address``.
-        RuntimeError: If trials ended in an error; what the others found is written.
+        RuntimeError: If Ray does not start, or trials ended in an error; what the others found is
+            written.
         BlockingIOError: If another process works in ``out``.
         OSError: If something cannot be written.
         ValueError: If ``workers`` or ``failures`` is out of range.
@@ -222,19 +215,15 @@ def _tune(
     trials: Sequence[Trial], out: Path, workers: int, address: str | None, failures: int
 ) -> dict[str, str]:
     """Lets Ray Tune run the trials; returns what went wrong, by the trial's point."""
-    with ExitStack() as ends:
-        ends.enter_context(_environment(_RAY if address else _RAY | _own_cluster()))
-        import ray
+    with cluster(out, workers, address), progress_bar(len(trials), unit="trials") as bar:
         from ray import tune
 
         class Progress(tune.Callback):
-            bar = ends.enter_context(progress_bar(len(trials), unit="trials"))
-
             def on_trial_complete(self, *_: Any, **__: Any) -> None:
-                self.bar.update()
+                bar.update()
 
             def on_trial_error(self, *_: Any, **__: Any) -> None:
-                self.bar.update()
+                bar.update()
 
         start = Path.cwd()
 
@@ -245,16 +234,6 @@ def _tune(
             result = trial.run(out / TRIALS / trial.name)
             tune.report({name: row["mean"] for name, row in result["figures"].items()})
 
-        variables = {"OMP_NUM_THREADS": "1", "PYTHONPATH": os.environ.get("PYTHONPATH", "")}
-        if not ray.is_initialized():
-            where: dict[str, Any] = {"address": address}
-            if address is None:
-                folder = ends.enter_context(_temporary(out))
-                where = {"address": "local", "num_cpus": workers, "include_dashboard": False,
-                         "_temp_dir": str(folder)}  # fmt: skip
-            ends.callback(ray.shutdown)
-            with _own_sigterm():
-                ray.init(**where, log_to_driver=False, runtime_env={"env_vars": variables})
         tuner = tune.Tuner(
             tune.with_resources(trainable, {"cpu": 1}),
             param_space={"number": tune.grid_search(list(range(len(trials))))},
@@ -288,54 +267,6 @@ def _result(file: Path) -> dict[str, Any]:
 def _last_line(error: Exception) -> str:
     """What an error says, without the way that it has come."""
     return str(error).strip().splitlines()[-1]
-
-
-def _own_cluster() -> dict[str, str]:
-    """What Ray is told of a cluster that nobody else is to reach: by the machine's own address
-    alone, and with a token that is nowhere but in its processes.
-    """
-    return {"RAY_ENABLE_WINDOWS_OR_OSX_CLUSTER": "0", "RAY_AUTH_TOKEN": secrets.token_hex(32)}
-
-
-@contextmanager
-def _own_sigterm() -> Iterator[None]:
-    """Leaves SIGTERM to whom it belonged before; Ray would take it."""
-    before = signal.getsignal(signal.SIGTERM)
-    try:
-        yield
-    finally:
-        if threading.current_thread() is threading.main_thread():
-            signal.signal(signal.SIGTERM, before)
-
-
-@contextmanager
-def _environment(variables: Mapping[str, str]) -> Iterator[None]:
-    """Environment variables for a while, where they are not set."""
-    new = {name: value for name, value in variables.items() if name not in os.environ}
-    os.environ.update(new)
-    try:
-        yield
-    finally:
-        for name in new:
-            os.environ.pop(name, None)
-
-
-@contextmanager
-def _temporary(out: Path) -> Iterator[Path]:
-    """A folder for what Ray keeps while it runs, its sockets above all, whose paths must be short.
-
-    What a sweep into the same folder that was killed has left of it is removed first.
-    """
-    mark = f"tca-mj-{hashlib.sha256(str(out).encode()).hexdigest()[:6]}-"
-    usual = "/tmp" if sys.platform == "darwin" else tempfile.gettempdir()
-    where = Path(os.environ.get("RAY_TMPDIR", usual))
-    for old in where.glob(f"{mark}*"):
-        shutil.rmtree(old, ignore_errors=True)
-    folder = Path(tempfile.mkdtemp(prefix=mark, dir=where))
-    try:
-        yield folder
-    finally:
-        shutil.rmtree(folder, ignore_errors=True)
 
 
 def _write(sweep: Sweep, found: Sequence[dict[str, Any]], out: Path) -> None:

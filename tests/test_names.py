@@ -50,8 +50,8 @@ INTERNAL = {
         "task": "broken_off how_it_ended parts together",
     },
     "tca_mj.agents": {
-        "evaluate": "endings report", "finished": "begun keep", "output": "*", "progress": "*",
-        "workers": "*",
+        "cluster": "*", "evaluate": "endings report", "finished": "begun keep",
+        "output": "*", "progress": "*", "workers": "*",
     },
     "tca_mj.agents.policies": {"archives": "*", "load": "require_untold", "onnx": "*"},
     "tca_mj.agents.scripts": {

@@ -6,15 +6,19 @@ import os
 import signal
 import sys
 import threading
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
 
 from tca_mj import cli
+from tca_mj.agents import cluster as clusters
 from tca_mj.agents import sweep as module
 from tca_mj.agents.design import designed, robot_of
 from tca_mj.agents.evaluate import Evaluation
-from tca_mj.agents.sweep import RESULT, TRIALS, Sweep, run_sweep
+from tca_mj.agents.finished import EPISODES
+from tca_mj.agents.policies import SavedPolicy, shipped
+from tca_mj.agents.sweep import TRIALS, Sweep, run_sweep
 from tca_mj.robots.tetrapod import TetrapodSpec
 from tca_mj.tca import CATALOGUE
 
@@ -150,8 +154,8 @@ def test_without_ray_it_says_what_to_install(tmp_path, capsys, monkeypatch):
     assert "pip install 'ray[tune]>=2.50'" in capsys.readouterr().err
 
 
-def workers_of_ray():
-    """Ids of Ray's workers that this process has started, by way of others."""
+def descendants():
+    """Ids and names of the processes that this one has started, by way of others too."""
     parents, names = {}, {}
     for folder in Path("/proc").glob("[0-9]*"):
         try:
@@ -160,47 +164,89 @@ def workers_of_ray():
         except OSError:
             continue  # it has just ended
         parents[int(folder.name)] = int(fields[1])
-    found = []
+    found = {}
     for process, name in names.items():
         above = process
         while above in parents and above != os.getpid():
             above = parents[above]
-        if above == os.getpid() and name.startswith("ray::ImplicitFunc"):  # not Ray's own agents
-            found.append(process)
+        if above == os.getpid() != process:
+            found[process] = name
     return found
 
 
-@pytest.mark.skipif(not os.environ.get("TCA_MJ_RAY"), reason="takes minutes; TCA_MJ_RAY=1 runs it")
+def listening(processes):
+    """Addresses on which processes wait for connections, hexadecimal as in /proc."""
+    held = set()
+    for process in processes:
+        for link in Path(f"/proc/{process}/fd").glob("*"):
+            with suppress(OSError):  # it was just closed
+                held.add(os.readlink(link))
+    rows = [line.split() for kind in ("tcp", "tcp6")
+            for line in Path(f"/proc/net/{kind}").read_text().splitlines()[1:]]  # fmt: skip
+    return {row[1].partition(":")[0] for row in rows
+            if row[3] == "0A" and f"socket:[{row[9]}]" in held}  # fmt: skip
+
+
+# 127.0.0.1, and the same in IPv6's clothes; "everything" would be zeros.
+LOOPBACK = {"0100007F", "0000000000000000FFFF00000100007F", "00000000000000000000000001000000"}
+
+
 @pytest.mark.skipif(not Path("/proc").is_dir(), reason="looks for processes in /proc")
-def test_a_trial_whose_process_is_lost_goes_on(tmp_path):
-    """By Ray: workers are killed outright as soon as an episode is finished."""
-    pytest.importorskip("ray.tune")
-    evaluation = Evaluation(task=REACH, policy="random", episodes=6, steps=150)
+def test_a_trial_whose_process_is_lost_goes_on(tmp_path, monkeypatch):
+    """By Ray: a worker is killed outright as soon as it has finished an episode. Meanwhile nobody
+    outside can connect, and nothing is left: no process, no folder, no token.
+    """
+    pytest.importorskip("ray")
+    monkeypatch.setenv("HOME", str(tmp_path / "home"))
+    monkeypatch.chdir(tmp_path)
+    made = SavedPolicy.read(shipped()["bend-reach"]).save("policy.npz")
+    evaluation = Evaluation(task=REACH, policy=str(made), episodes=4, steps=150)
     sweep = Sweep(evaluation=evaluation, axes={"seed": (0, 10)})
-    killed = []
+    killed, seen = [], set()
 
     def kill():
-        while not killed and not over.wait(0.02):
-            files = tmp_path.glob(f"sweep/{TRIALS}/*/evaluation/episodes.jsonl")
-            if any(file.stat().st_size for file in files):
-                for process in workers_of_ray():
-                    os.kill(process, signal.SIGKILL)
-                    killed.append(process)
+        while not over.wait(0.02):
+            started = descendants()
+            seen.update(listening(started))
+            done = [path for path in tmp_path.glob(f"out/{TRIALS}/*/evaluation/{EPISODES}")
+                    if path.stat().st_size]  # fmt: skip
+            workers = [pid for pid, name in started.items() if name.startswith("ray::ImplicitFunc")]
+            if done and workers and not killed:
+                os.kill(workers[0], signal.SIGKILL)
+                killed.append(workers[0])
 
     over = threading.Event()
     killer = threading.Thread(target=kill)
     killer.start()
+    before = set(descendants())
     try:
-        found = run_sweep(sweep, tmp_path / "sweep", workers=2)
+        found = run_sweep(sweep, tmp_path / "out", workers=2)
     finally:
         over.set()
         killer.join()
-    assert killed
+    assert killed and seen and seen <= LOOPBACK
     for row, trial in zip(found, sweep.trials(), strict=True):
         assert row["figures"] == trial.run(tmp_path / "alone" / trial.name)["figures"]
-        folder = tmp_path / "sweep" / TRIALS / trial.name
-        lines = (folder / "evaluation" / "episodes.jsonl").read_text().splitlines()
-        seeds = [json.loads(line)["seed"] for line in lines]
+        folder = tmp_path / "out" / TRIALS / trial.name
+        lines = (folder / "evaluation" / EPISODES).read_text().splitlines()
         first = int(trial.point["seed"])
-        assert seeds == list(range(first, first + 6))  # what was finished was not run again
-        assert (folder / RESULT).is_file()
+        seeds = [json.loads(line)["seed"] for line in lines]
+        assert seeds == list(range(first, first + 4))  # what was finished was not run again
+    left = set(descendants()) - before
+    assert not [name for name in map(descendants().get, left) if name and "ray" in name]
+    names = sorted(path.name for path in (tmp_path / "out").iterdir())
+    assert names == ["ray", "results.csv", "results.md", "sweep.json", "trials"]
+    assert not (tmp_path / "home").exists()
+    with clusters._temporary(tmp_path / "out") as own:
+        assert [own] == list(own.parent.glob(f"{own.name[:-8]}*"))
+
+
+def test_what_a_killed_sweep_left_of_ray_is_removed(tmp_path, monkeypatch):
+    monkeypatch.setenv("RAY_TMPDIR", str(tmp_path))
+    monkeypatch.setattr(clusters, "_SHORT", 1000)
+    with clusters._temporary(tmp_path / "out") as first, clusters._temporary(tmp_path / "other"):
+        (first / "session").mkdir()
+        with clusters._temporary(tmp_path / "out") as second:
+            assert not first.exists() and first.name[:-8] == second.name[:-8]
+            assert len(list(tmp_path.iterdir())) == 2
+    assert list(tmp_path.iterdir()) == []
