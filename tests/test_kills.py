@@ -24,6 +24,7 @@ import pytest
 from tca_mj.agents.finished import EPISODES, kept
 from tca_mj.agents.policies import SavedPolicy
 from tca_mj.agents.train.runs import STATE, RunFolder
+from tca_mj.files import LOCK
 
 pytestmark = pytest.mark.skipif(not Path("/proc").is_dir(), reason="looks for processes in /proc")
 
@@ -152,6 +153,11 @@ class Killer:
         assert self.start().wait(timeout=PATIENCE) in (0, 1)  # a demo that is no success
         return time.monotonic() - start
 
+    def holds(self, process: int) -> bool:
+        """Whether a process, which may just have ended, has or had the folder last."""
+        lock = self.out / LOCK
+        return lock.exists() and f"process {process} " in lock.read_text()
+
     def alive(self) -> list[int]:
         """Processes that descend from the command, however far: they have its mark."""
         found = []
@@ -199,7 +205,7 @@ def kill(name: str, times: int, folder: Path, seed: int) -> Counter[str]:
         except subprocess.TimeoutExpired:
             os.kill(run.pid, signal.SIGKILL)
             found["kills"] += 1
-            found["while writing"] += (killer.out / ".tca-mj.lock").exists()
+            found["at work"] += killer.holds(run.pid)
             run.wait()
             if command.lingers < 60.0:
                 lived = int(1e3 * killer.gone(command.lingers))
