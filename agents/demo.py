@@ -4,22 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from contextlib import nullcontext
-from functools import partial
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
 import gymnasium as gym
 import numpy as np
 
-from tca_mj.agents.episode import PLOT, RECORDING, VIDEO, Episode
+from tca_mj.agents.episode import PLOT, RECORDING, VIDEO, Duration, Episode
 from tca_mj.agents.policies import Policy, Preprocessing
 from tca_mj.agents.policies.actors import actor, arguments_of
-from tca_mj.checks import Seed, door, number
+from tca_mj.checks import Seed, door
 from tca_mj.files import claimed
 from tca_mj.record.film import FilmSpeed
 from tca_mj.registry import make
-
-_Duration = Annotated[float, partial(number, above=0.0, at_most=86_400.0, unit="s")]
 
 
 @door
@@ -34,7 +31,7 @@ def play(
     out: Path | None = None,
     video: bool = True,
     speed: FilmSpeed | None = None,
-    max_duration: _Duration | None = None,
+    max_duration: Duration | None = None,
     progress: bool = True,
 ) -> dict[str, Any]:
     """Runs one episode of any policy in any task and writes what happened.

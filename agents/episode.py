@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import gymnasium as gym
 import numpy as np
@@ -23,11 +23,14 @@ from tca_mj.agents.output import plain, write_json
 from tca_mj.agents.policies import Policy
 from tca_mj.agents.progress import progress_bar
 from tca_mj.agents.rollout import Step, rollout
+from tca_mj.checks import Seed, door, number
 from tca_mj.envs.task import Headway
 from tca_mj.envs.wrappers import RecordRerun
 from tca_mj.machine import machine, versions
-from tca_mj.record.film import Film
+from tca_mj.record.film import Film, FilmSpeed
 from tca_mj.record.plots import rollout_plot
+
+Duration = Annotated[float, partial(number, above=0.0, at_most=86_400.0, unit="s")]
 
 SUMMARY, RECORDING, VIDEO, PLOT = "summary.json", "rollout.rrd", "rollout.mp4", "rollout.png"
 
@@ -38,13 +41,14 @@ _BAR = "{desc:9} |{bar}| {n:.1f} of at most {total:.0f} s simulated, {elapsed} r
 class Episode:
     """One episode under way, and what was seen of it so far."""
 
+    @door
     def __init__(
         self,
         env: gym.Env[Any, Any],
         policy: Policy,
         *,
         names: tuple[str, str],
-        seed: int,
+        seed: Seed,
         out: Path | None,
         options: Mapping[str, Any] | None = None,
         files: Sequence[str] = (RECORDING, VIDEO, PLOT),
@@ -59,6 +63,9 @@ class Episode:
             out: Folder for the files; None to write nothing.
             options: Options of the reset.
             files: What is written besides ``SUMMARY``; ``RECORDING`` always is.
+
+        Raises:
+            ValueError: If an argument is not of its kind, or as the ``reset`` of the task.
         """
         task: Any = env.unwrapped
         self.task, self.sim, self.policy = task, task.sim, policy
@@ -84,11 +91,12 @@ class Episode:
         self._note_phase()
         self._see(self.last)
 
-    def run(self, limit: float, *, speed: float, progress: bool) -> dict[str, Any]:
+    @door
+    def run(self, limit: Duration, *, speed: FilmSpeed, progress: bool) -> dict[str, Any]:
         """Goes on to the end, and writes what happened.
 
         Args:
-            limit: Simulated time after which to stop [s].
+            limit: Simulated time after which to stop, at most a day [s].
             speed: Simulated seconds per second of film.
             progress: Whether to show how far it is.
 

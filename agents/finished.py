@@ -28,6 +28,9 @@ def kept(path: Path, key: str) -> dict[int, dict[str, Any]]:
     Args:
         path: The file, one JSON object a line.
         key: What ``Evaluation.key`` says.
+
+    Raises:
+        OSError: If it cannot be read.
     """
     return _by_seed(_read(path)[0], key)
 

@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+from tca_mj.checks import door, shown
 from tca_mj.hints import nearest
 
 __all__ = ["mjcf"]
@@ -9,6 +10,7 @@ __all__ = ["mjcf"]
 _MJCF = Path(__file__).resolve().parent / "mjcf"
 
 
+@door
 def mjcf(name: str) -> Path:
     """Finds a file of the package's MJCF folder, in an editable as in a plain install.
 
@@ -26,7 +28,7 @@ def mjcf(name: str) -> Path:
     }
     if name not in known:
         raise ValueError(
-            f"no MJCF file {name!r}, known are {', '.join(sorted(known)) or 'none'}"
+            f"name must be one of {', '.join(sorted(known)) or 'none'}, got {shown(name)}"
             f"{nearest(name, known)}"
         )
     return known[name]

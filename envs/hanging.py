@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tca_mj.assets import mjcf
 from tca_mj.checks import door, number, require_one_of, within
+from tca_mj.model.chain import Place, Quaternion
 from tca_mj.model.part import Part, new_spec
 from tca_mj.model.scene import scene
 from tca_mj.modules.bending import BendingSpec, bending_module
@@ -158,7 +157,7 @@ class StaticTip:
 
 
 @door
-def hang(module: Part, place: Sequence[float], turn: Sequence[float], stand: str) -> Part:
+def hang(module: Part, place: Place, turn: Quaternion, stand: str) -> Part:
     """A scene in which ``module``, of that name, hangs from a stand.
 
     Args:

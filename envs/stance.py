@@ -10,7 +10,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from tca_mj.checks import Finite, Positive, door, number, require_one_of, row
+from tca_mj.checks import Angle, Positive, door, number, require_one_of, row
 from tca_mj.model.part import Part
 from tca_mj.model.scene import scene
 from tca_mj.robots.tetrapod import LEGS, TetrapodSpec, rigid_tetrapod, set_rigid_bend, tetrapod
@@ -202,7 +202,7 @@ class Stance:
         *,
         bend: _Bend,
         position: _Spot = (0.0, 0.0),
-        yaw: Finite = 0.0,
+        yaw: Angle = 0.0,
         above: _Height = 0.0,
     ) -> Callable[[mujoco.MjData], None]:
         """What ``Simulation.reset`` needs to put the robot onto what is below it.

@@ -16,11 +16,12 @@ from gymnasium.utils import RecordConstructorArgs
 from gymnasium.vector import VectorWrapper
 from gymnasium.vector.utils import batch_space
 
-from tca_mj.checks import require_count, require_positive
+from tca_mj.checks import door
 from tca_mj.envs.table import Table
 from tca_mj.envs.task import Observation, how_it_ended
 from tca_mj.envs.vector import TaskVector
 from tca_mj.record import Recorder
+from tca_mj.record.recorder import Chunk, Every, Radius
 
 
 class ScaledObservation(
@@ -32,6 +33,7 @@ class ScaledObservation(
     say what a number means. Left and right have the same scales.
     """
 
+    @door
     def __init__(self, env: gym.Env[Observation, Any]) -> None:
         """Wraps a task.
 
@@ -54,6 +56,7 @@ class ScaledObservation(
 class VectorScaledObservation(VectorWrapper):
     """``ScaledObservation`` of a vector environment, in every autoreset mode."""
 
+    @door
     def __init__(self, env: TaskVector) -> None:
         """Wraps several tasks.
 
@@ -113,15 +116,16 @@ class RecordRerun(gym.Wrapper[ObsType, ActType, ObsType, ActType], RecordConstru
         seconds: Time that the recording has taken so far on the caller's thread [s].
     """
 
+    @door
     def __init__(
         self,
         env: gym.Env[ObsType, ActType],
         path: str | Path,
         *,
         application_id: str = "tca-mj",
-        every: int = 1,
-        chunk: int = 100,
-        tca_radius: float | None = None,
+        every: Every = 1,
+        chunk: Chunk = 100,
+        tca_radius: Radius | None = None,
         footer: bool = True,
     ) -> None:
         """Wraps ``env``; apart from ``env`` the arguments are those of ``Recorder``.
@@ -130,19 +134,16 @@ class RecordRerun(gym.Wrapper[ObsType, ActType, ObsType, ActType], RecordConstru
             env: A task of this package: its ``unwrapped`` has the simulation as ``sim``.
             path: File to write, ending in ``.rrd``. What it held is lost at the first ``reset``.
             application_id: Name under which the viewer keeps layouts and groups recordings.
-            every: Records every so many-th step.
-            chunk: Recorded steps that are collected before they are written.
-            tca_radius: Radius of the drawn TCAs [m]; None for one that can be seen.
+            every: Records every so many-th step, up to every millionth.
+            chunk: Recorded steps that are collected before they are written, up to 10 000.
+            tca_radius: Radius of the drawn TCAs, at most 1 m [m]; None for one that can be seen.
             footer: Ends the file with a table of contents.
 
         Raises:
-            ValueError: If ``env`` has no simulation or a number is not positive.
+            ValueError: If ``env`` has no simulation or a number is out of bounds.
         """
         if not hasattr(env.unwrapped, "sim"):
             raise ValueError(f"env must have a simulation as env.unwrapped.sim, got {env}")
-        require_count(every=every, chunk=chunk)
-        if tca_radius is not None:
-            require_positive(tca_radius=tca_radius)
         options: dict[str, Any] = {
             "application_id": application_id,
             "every": every,

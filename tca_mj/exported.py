@@ -14,7 +14,7 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tca_mj.checks import door, floats
+from tca_mj.checks import door, floats, shown
 from tca_mj.files import write_whole
 from tca_mj.model.part import Part
 from tca_mj.sim import Simulation, SimulationDiverged
@@ -44,6 +44,7 @@ def export(
 
     Raises:
         ValueError: If the temperatures have the wrong shape or are below the surroundings'.
+        OSError: If the file cannot be written.
         SimulationDiverged: If there is no rest at them.
     """
     own = part.copy()
@@ -51,7 +52,10 @@ def export(
     ambient = np.broadcast_to(sim.bank.heat.ambient, sim.n)
     if (sim.model.jnt_type == int(mujoco.mjtJoint.mjJNT_FREE)).any():
         sim.model.opt.gravity[:] = 0.0  # nothing holds it: its shape as it floats
-    left = sim.rest(ambient if temperatures is None else floats("temperatures", temperatures))
+    asked = floats("temperatures", ambient if temperatures is None else temperatures)
+    if asked.shape not in ((), (sim.n,)):
+        raise ValueError(f"temperatures must be one or {sim.n}, got {shown(temperatures)}")
+    left = sim.rest(asked)
     if left > _STILL:
         raise SimulationDiverged(
             f"the part does not come to rest at temperatures {temperatures!r}: a joint still moves"
@@ -68,8 +72,14 @@ def frozen(sim: Simulation, spec: mujoco.MjSpec, path: str | Path | None = None)
         sim: The simulation.
         spec: What it was compiled from; the law and the springs are written to it.
         path: The file; None to return the text only.
+
+    Raises:
+        ValueError: If it is another specification.
+        OSError: If the file cannot be written.
     """
     model = sim.model
+    if not all(spec.actuator(name) for name in sim.tca_names) or len(spec.joints) != model.njnt:
+        raise ValueError(f"spec must be what sim was compiled from, got {spec.modelname!r}")
     for joint in spec.joints:
         number = joint.id
         if model.jnt_type[number] < int(mujoco.mjtJoint.mjJNT_SLIDE):
@@ -79,7 +89,7 @@ def frozen(sim: Simulation, spec: mujoco.MjSpec, path: str | Path | None = None)
         joint.damping[0] = model.dof_damping[model.jnt_dofadr[number]]
     for name, number in zip(sim.tca_names, sim.actuator, strict=True):
         spec.actuator(name).biasprm = model.actuator_biasprm[number]
-    spec.add_key(name=REST, qpos=sim.data.qpos)
+    (spec.key(REST) or spec.add_key(name=REST)).qpos = sim.data.qpos
     text: str = spec.to_xml()
     if path is not None:
         write_whole(Path(path), text.encode())

@@ -19,9 +19,9 @@ from typing import Annotated, Any, Protocol
 import numpy as np
 
 from tca_mj.checks import (
+    Angle,
     Array,
     Checked,
-    Finite,
     NotNegative,
     Numbers,
     Positive,
@@ -63,7 +63,7 @@ class Helix(Checked):
 
     radius: Annotated[float, _radius]
     turns: Turns = 0.0
-    phase: Finite = 0.0
+    phase: Angle = 0.0
 
     @property
     def legs(self) -> tuple[Helix, ...]:
@@ -132,7 +132,7 @@ class UTurn(Checked):
 
     @classmethod
     @door
-    def double_helix(cls, radius: NotNegative, turns: Turns, phase: float = 0.0) -> UTurn:
+    def double_helix(cls, radius: NotNegative, turns: Turns, phase: Angle = 0.0) -> UTurn:
         """A TCA folded in half and wound as two helices of ``turns`` turns, half a turn apart."""
         return cls(Helix(radius, turns, phase), Helix(radius, turns, phase + np.pi))
 
@@ -169,7 +169,7 @@ AnyRoute = Annotated[Route, require_route]
 
 
 @door
-def parallel(count: TcaCount, radius: NotNegative, phase: float = 0.0) -> tuple[Helix, ...]:
+def parallel(count: TcaCount, radius: NotNegative, phase: Angle = 0.0) -> tuple[Helix, ...]:
     """Routes of ``count`` straight TCAs at equal angles round the centre line.
 
     Args:

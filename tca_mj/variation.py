@@ -15,7 +15,7 @@ from typing import Annotated, Any, TypeVar, get_type_hints
 
 import numpy as np
 
-from tca_mj.checks import Checked, bounds, door, instance, number, shown
+from tca_mj.checks import Checked, bounds, door, instance, number, require_one_of, shown
 from tca_mj.sim import Ambient, Simulation
 from tca_mj.smp import HeaterSpec
 from tca_mj.tca import HeatSpec
@@ -65,7 +65,12 @@ class Variation(Checked):
 
     @classmethod
     def bounds(cls, name: str) -> tuple[float, float]:
-        """Least and largest value of a field."""
+        """Least and largest value of a field.
+
+        Raises:
+            ValueError: If there is no such field.
+        """
+        require_one_of("name", name, cls.names())
         return bounds(get_type_hints(cls, include_extras=True)[name])
 
     @classmethod

@@ -1,10 +1,14 @@
 """Calls what the package offers with hostile arguments, and judges what comes of it.
 
-``surfaces`` walks the modules of the package and finds functions, constructors, class methods and
-methods, whoever adds one. A call gets what its annotations ask for, but for an argument or two
-that are hostile: not a number, huge, of a wrong kind, shape or specification. It may return
-something without a NaN, or raise ``ValueError`` with name, value and bound, or what its docstring
-says under ``Raises:``, within 30 s.
+``surfaces`` walks what the packages offer and finds functions, constructors, class methods and
+methods, whoever adds one; of the tasks in the registry it finds the arguments, the options of
+``reset``, the figures of the robot and the action. A call gets what its annotations ask for, but
+for an argument or two that are hostile: not a number, huge, of a wrong kind, shape or
+specification. It may return something without a NaN, or raise ``ValueError`` with name, value and
+bound, or what its docstring says under ``Raises:``, within 30 s.
+
+``python tests/fuzzing.py 10000 FOLDER`` tries ten thousand cases, goes on where it was stopped,
+and writes a table.
 """
 
 import datetime
@@ -15,14 +19,15 @@ import re
 import resource
 import signal
 import sys
-import tempfile
 import typing
 import warnings
+import zlib
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, fields, is_dataclass
 from enum import Enum
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from types import NoneType, UnionType
 from typing import Annotated, Any, Literal, Union, get_args, get_origin
@@ -30,16 +35,27 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin
 import gymnasium as gym
 import mujoco
 import numpy as np
+from hypothesis import HealthCheck, Phase, given, seed, settings
+from hypothesis import strategies as st
 from numpy.polynomial import Polynomial
 from numpy.typing import ArrayLike
 from test_names import offered
 
 import tca_mj
-from tca_mj import checks, control, variation
+from tca_mj import checks, control, rod, variation
+from tca_mj.agents.design import designed
+from tca_mj.agents.policies.network import Network
 from tca_mj.agents.train.config import OffPolicy
 from tca_mj.assets import mjcf
-from tca_mj.envs.task import SimulatedTask
+from tca_mj.envs.task import SimulatedTask, TaskArguments
+from tca_mj.envs.vector import TaskVector
+from tca_mj.model.chain import Chain
+from tca_mj.model.tendon import route_passes
+from tca_mj.modules.bending import bending_module
+from tca_mj.registry import TASKS, task_class
+from tca_mj.registry import find_task as task_spec
 
+SEVERAL = object()  # what stands for the default of *arguments, of which one is given
 SECONDS = 30  # longest time of a case
 MEMORY = 6 << 30  # largest memory that a case may take besides [bytes]
 
@@ -59,6 +75,8 @@ NO_DOOR = {
             "sim.Simulation.take", "tca.dynamics.stepping.LoadedTcas.heated",
             "tca.dynamics.stepping.LoadedTcas.pull", "tca.supply.Supply.power",
             "tca.dynamics.stepping.LoadedTcas.check_domain", "tca.supply.Supply.like", "actuation",
+            "smp.bank.SpineBank.advance", "envs.options.Uniform.__call__",
+            "envs.options.Constant.__call__",
         ),
         _KERNEL,
     ),
@@ -91,22 +109,30 @@ class NoSample(LookupError):
 
 @dataclass(frozen=True)
 class Surface:
-    """What is called: its name, the function, and the kind of object that it is a method of."""
+    """What is called: its name, the function, and the kind of object that it is a method of.
+
+    ``named`` are parameters that the function takes as ``**named``, with values near which things
+    become wrong.
+    """
 
     name: str
     function: Callable[..., Any]
     owner: Any = None
     errors: frozenset[str] = frozenset()
+    named: Mapping[str, tuple[Any, ...]] = field(default_factory=dict)
 
     @property
-    def parameters(self) -> dict[str, Any]:
-        """Annotation of each parameter by name."""
+    def parameters(self) -> dict[str, tuple[Any, Any]]:
+        """Annotation and default of each parameter by name."""
+        if self.named:
+            return {name: (Any, None) for name in self.named}
         return _parameters(self.function)
 
     def call(self, arguments: Mapping[str, Any]) -> Any:
         given = dict(arguments)
         before = () if self.owner is None else (good(self.owner, "self", self.name),)
-        return self.function(*before, **given)
+        several = tuple(given.pop(n) for n, (_, d) in self.parameters.items() if d is SEVERAL)
+        return self.function(*before, *several, **given)
 
 
 @cache
@@ -117,11 +143,10 @@ def _parameters(function: Any) -> dict[str, tuple[Any, Any]]:
         hints = typing.get_type_hints(target, include_extras=True)
     except (NameError, TypeError):
         hints = {}
-    kinds = (inspect.Parameter.POSITIONAL_OR_KEYWORD, inspect.Parameter.KEYWORD_ONLY)
     found = inspect.signature(target).parameters.values()
     return {
-        p.name: (hints.get(p.name, Any), p.default)
-        for p in found if p.kind in kinds and p.name not in ("self", "cls")
+        p.name: (hints.get(p.name, Any), SEVERAL if p.kind is p.VAR_POSITIONAL else p.default)
+        for p in found if p.kind is not p.VAR_KEYWORD and p.name not in ("self", "cls")
     }  # fmt: skip
 
 
@@ -138,6 +163,89 @@ def surfaces() -> Iterator[Surface]:
             yield from _of_class(name, thing)
         elif not _closed(name) and inspect.isfunction(thing):
             yield Surface(name, thing, errors=_errors(thing))
+
+
+def tasks() -> Iterator[Surface]:
+    """What can be said to the tasks of the registry."""
+    for task in TASKS:
+        kind = task_class(task.id)
+        known = dict.fromkeys([*_parameters(kind), *TaskArguments.__annotations__], ())
+        yield Surface(f"{task.id} arguments", partial(_constructed, task.id), named=known)
+        rows = {row.name: _near(row.low, row.high) for row in _task(task.id).options.rows}
+        yield Surface(f"{task.id} options", partial(_begun, task.id), named={"seed": ()} | rows)
+        size = _task(task.id).action.size
+        actions = tuple(np.full(size, value) for value in (-1.1, -1.0, 0.3, 1.0, np.nan))
+        yield Surface(f"{task.id} action", partial(_acted, task.id), named={"action": actions})
+        robot = {
+            path: tuple(type(value)(factor * value) for factor in (0.1, 0.4, 0.8, 1.3, 2.5, 10.0))
+            for path, value in figures(kind.robot_argument[1]())
+        }
+        yield Surface(f"{task.id} robot", partial(_robot, task.id), named=robot)
+        yield Surface(f"{task.id} vector", partial(_vector, task.id), named=dict.fromkeys(
+            ("num_envs", "num_threads", "max_episode_steps", "autoreset_mode", "reset_options"), ()
+        ))
+
+
+def _near(low: float, high: float) -> tuple[float, ...]:
+    """Bounds that are there, what is just beyond them, and what is between."""
+    bounds = [bound for bound in (low, high) if math.isfinite(bound)]
+    beyond = [low - 1e-3 * abs(low) - 1e-6, high + 1e-3 * abs(high) + 1e-6]
+    between = [low + share * (high - low) for share in (0.2, 0.7)] if bounds[1:] else []
+    return (*bounds, *(value for value in beyond if math.isfinite(value)), *between)
+
+
+def figures(spec: Any, before: str = "") -> Iterator[tuple[str, float]]:
+    """Path and value of each number of a specification and of those in it."""
+    for each in fields(spec):
+        value = getattr(spec, each.name)
+        if is_dataclass(value):
+            yield from figures(value, f"{before}{each.name}.")
+        elif isinstance(value, float | int) and not isinstance(value, bool):
+            yield f"{before}{each.name}", value
+
+
+@cache
+def _task(id: str) -> Any:
+    return tca_mj.make(id).unwrapped
+
+
+def _constructed(id: str, **arguments: Any) -> None:
+    task_class(id)(**task_spec(id).kwargs | arguments)
+
+
+def _begun(id: str, **said: Any) -> Any:
+    task, seed = _task(id), said.pop("seed", 0)
+    return _first_step(task, task.reset(seed=seed, options=said))
+
+
+def _first_step(task: Any, begun: Any) -> Any:
+    """What the first steps of an episode say, which has to be within the declared spaces."""
+    outcome = task.step(task.action.still)
+    for seen in (begun[0], outcome[0]):
+        assert task.observation_space.contains(seen), task.observation.outside(seen)
+    reason = outcome[4].get("truncation_reason", "")
+    assert not reason.startswith("diverged"), reason
+    return begun, outcome
+
+
+def _acted(id: str, action: Any) -> Any:
+    task = _task(id)
+    task.reset(seed=0)
+    outcome = task.step(action)
+    assert task.observation_space.contains(outcome[0]), task.observation.outside(outcome[0])
+    return outcome
+
+
+def _robot(id: str, **design: Any) -> Any:
+    kind = task_class(id)
+    argument, default = kind.robot_argument
+    robot = designed(default(), design)
+    task = kind(**task_spec(id).kwargs, **{argument: robot})
+    return _first_step(task, task.reset(seed=0))
+
+
+def _vector(id: str, **arguments: Any) -> None:
+    TaskVector(task_class(id), **task_spec(id).kwargs, **arguments)
 
 
 def _closed(name: str) -> bool:
@@ -196,10 +304,23 @@ def _setup() -> dict[str, Any]:
 def _recorded() -> Path:
     from tca_mj.record import Recorder
 
-    path = Path(tempfile.mkdtemp()) / "good.rrd"
+    path = Path("good.rrd").absolute()
     with Recorder(good(tca_mj.Simulation), path) as recorder:
         recorder.frame()
     return path
+
+
+@cache
+def _statistics() -> Path:
+    path = Path("statistics.npz").absolute()
+    np.savez(path, mean=np.zeros(3), var=np.ones(3), clip=10.0, epsilon=1e-8)
+    return path
+
+
+@cache
+def _exported() -> tuple[Any, Any]:
+    part = bending_module()
+    return tca_mj.Simulation(part), part.spec
 
 
 # What an argument is where its annotation does not say: by parameter, in SI units.
@@ -214,8 +335,11 @@ BY_NAME: dict[str, Any] = {
     "name": "tca9", "width": 5e-3, "height": 5e-3, "inner": 6e-4, "outer": 2e-3, "duration": 0.02,
     "start": 80.0, "seed": 1, "modulus": 1e8, "excess_ratio": 2.0, "cooling": True,
     "bending_rate": 0.0, "memory": 0.1, "error": 0.1, "duty": 0.5, "periods": 3.0, "stiff": 0.1,
+    "passes": lambda: route_passes(_samples()[Chain](), good(tca_mj.Helix)),
     "torsion_per_tension": 200.0, "section": 3e-5, "perimeter": 0.02, "cycles": 2,
 }  # fmt: skip
+# Words by which messages call parameters.
+SAID_AS = {"given": "options", "temperatures": "temperature", "drives": "drive", "value": "x"}
 # The same for single surfaces.
 BY_SURFACE: dict[str, dict[str, Any]] = {
     "rod.beam.Outline": {"half_width": 4e-3, "half_height": 4e-3},
@@ -233,12 +357,24 @@ BY_SURFACE: dict[str, dict[str, Any]] = {
         "path": "plot.png",
     },
     "record.reader.read": {"path": lambda: _recorded()},
+    "sim.Simulation.bend": {"chains": "body"},
     "sim.Simulation.keep": {"temperature": [60.0] * 3},
     "sim.Simulation.rest": {"temperature": [30.0] * 3},
     "sim.Simulation.group": {"kind": "TCA"},
     "sim.Simulation.step": {"command": [0.1] * 3},
     "sim.Simulation.checked": {"command": [0.1] * 3, "voltage": 0.0, "fan": False},
     "smp.heater.fan_gain": {"start": 120.0},
+    "smp.heater.HeaterSpec.losing": {"fan": True}, "smp.heater.heat_spine": {"fan": True},
+    "smp.bank.SpineBank": {"owner": [0]},
+    "rod.shape.bend": {"axes": [[0.0, 0.0, 1.0], [0.0, 0.1, 0.995]]},
+    "variation.Variation.bounds": {"name": "mass"},
+    "record.render.colour_tendons": {"tendon": [0], "temperature": [60.0]},
+    "model.spine.sheath": {"**": lambda: {
+        "length": 0.1, "line_density": 0.03, "outline": good(rod.Outline),
+    }},
+    "routes.Helix.between": {"start": 0.0, "end": 0.5},
+    "routes.leg_length": {"leg": lambda: good(tca_mj.Helix)},
+    "model.mujoco_warnings.warning_line": {"counts": lambda: Counter({"x": 1})},
     "tca.fibre.centreline.Centreline.of_curve": {
         "position": lambda: _spiral, "end": 6.0, "start": 0.0,
     },
@@ -257,11 +393,23 @@ BY_SURFACE: dict[str, dict[str, Any]] = {
     "tca.supply.Supply.checked": {"n": 1},
     "variation.Nominal.apply": {"variation": lambda: variation.Variation()},
     "rod.beam.Outline.contains": {"x": 1e-3, "y": 1e-3},
+    "agents.episode.Episode": {"names": (_TASK, "off"), "out": None, "options": {}, "seed": 1},
+    "agents.episode.Episode.run": {"limit": 0.2, "speed": 1.0, "progress": False},
+    "agents.evaluate.cell": {"name": "return"}, "agents.evaluate.label": {"name": "return"},
+    "agents.evaluate.figures": {"rows": [{"return": 1.0}]},
+    "agents.policies.files.SavedPolicy.to_onnx": {"path": "network.onnx"},
+    "agents.policies.load.saved_policy": {"source": "bend-reach"},
+    "agents.policies.preprocessing.Statistics.read": {"path": lambda: _statistics()},
+    "agents.policies.sb3_zip.Model.preprocessed": {"statistics": None, "units": None},
+    "assets.mjcf": {"name": "arena.xml"},
+    "envs.hanging.hang": {"place": (0.0, 0.0, 0.1), "turn": (1.0, 0.0, 0.0, 0.0),
+                          "stand": "reach_stand"},
+    "exported.frozen": {"sim": lambda: _exported()[0], "spec": lambda: _exported()[1]},
     "agents.policies.actors.scripted": {"env": lambda: _env(_TASK, action="power")},
-    "agents.policies.files.load_policy": {
+    "agents.policies.load.load_policy": {
         "source": "bend-reach", "env": lambda: _env(_TASK, action="power"),
     },
-    "agents.policies.files.require_arguments": {"arguments": {}},
+    "agents.policies.load.require_arguments": {"arguments": {}},
     "agents.policies.gait.GaitPolicy.in_task": {
         "env": lambda: _env("TCA/TetrapodWalk-v0", action="power"), "steering": 0.0,
     },
@@ -280,7 +428,7 @@ BY_SURFACE: dict[str, dict[str, Any]] = {
     "agents.policies.files.SavedPolicy.make": {"env": lambda: _env(_TASK, action="power")},
     "envs.table.numbers": {"value": [0.5], "shape": (1,)},
     "envs.options.Option.checked": {"value": 0.5},
-    "envs.options.Option": {"draw": lambda: lambda random, setup: 0.5},
+    "envs.options.Option": {"**": lambda: {"draw": lambda random, setup: 0.5}},
     "envs.options.Options.setup": {"given": {}},
     "tca.fibre.centreline.Centreline": {
         "strain": lambda: lambda s: np.zeros((*np.shape(s), 3)), "rotation": lambda: np.eye(3),
@@ -303,10 +451,12 @@ BY_SURFACE: dict[str, dict[str, Any]] = {
     "agents.policies.actors.best_of": {"name": "off"},
     "agents.policies.actors.actor": {"name": "off"},
     "agents.policies.actors.first_gait": {"task": "TCA/TetrapodWalk-v0", "start": "scripted"},
-    "agents.policies.files.SavedPolicy": {"task": _TASK},
+    "agents.policies.files.SavedPolicy": {
+        "task": _TASK, "**": lambda: {"network": good(Network)},
+    },
     "agents.policies.files.SavedPolicy.save": {"path": "saved.npz"},
     "agents.policies.files.SavedPolicy.read": {"path": lambda: _shipped("bend-reach")},
-    "agents.policies.files.find": {"source": "bend-reach"},
+    "agents.policies.load.find": {"source": "bend-reach"},
     "agents.scripts.tetrapod.gait_policy": {"gait": "walk"},
     "agents.sweep.Sweep": {"axes": {"seed": [1, 2]}},
     "agents.train.config.TrainConfig": {
@@ -336,8 +486,9 @@ def good(hint: Any, name: str = "", surface: str = "") -> Any:
     samples = _samples()
     if isinstance(hint, typing.Hashable) and hint in samples:
         return samples[hint]()
-    if isinstance(origin, type) and origin in samples:
-        return samples[origin]()
+    for kind in (origin, inner[0] if origin is Annotated else None):
+        if isinstance(kind, type) and kind in samples:
+            return samples[kind]()
     if hint is bool:
         return True
     if hint in (ArrayLike, checks.Array) or hint == checks.Numbers:
@@ -409,19 +560,20 @@ def _first(members: Sequence[Any], name: str) -> Any:
 @cache
 def _samples() -> dict[Any, Callable[[], Any]]:
     from tca_mj import actuation, smp, tca
+    from tca_mj.agents.episode import Episode
     from tca_mj.agents.evaluate import Evaluation
-    from tca_mj.agents.policies import SavedPolicy, shipped
-    from tca_mj.agents.policies.network import Network
+    from tca_mj.agents.policies import Policy, SavedPolicy, shipped
+    from tca_mj.agents.policies.actors import Script, actor
     from tca_mj.agents.scripts.tetrapod import WALK
     from tca_mj.agents.train.config import TrainConfig
     from tca_mj.batch import SimulationBatch
     from tca_mj.envs.hanging import StaticTip
-    from tca_mj.envs.options import Option, Options
+    from tca_mj.envs.options import Constant, Option, Options
     from tca_mj.envs.table import Entry, Table
-    from tca_mj.model.chain import Chain, add_chain
+    from tca_mj.model.chain import add_chain
     from tca_mj.model.part import Part, new_spec
     from tca_mj.model.tendon import Pass, RoutedTca
-    from tca_mj.modules.bending import bending_module, silicone_cylinder
+    from tca_mj.modules.bending import silicone_cylinder
     from tca_mj.record.film import Film
     from tca_mj.record.recorder import Recorded, Recorder
     from tca_mj.record.render import Closing, Watched
@@ -511,6 +663,11 @@ def _samples() -> dict[Any, Callable[[], Any]]:
         OffPolicy: OffPolicy, variation.Nominal: lambda: variation.Nominal(bent()),
         smp.Damage: lambda: smp.Damage(*[np.zeros(1, bool)] * 3),
         Outline: lambda: Outline(4e-3, 4e-3),
+        Episode: lambda: Episode(
+            env(), actor("off", env()), names=(_TASK, "off"), seed=1, out=None, options={}
+        ),
+        Policy: lambda: actor("off", env()), Script: lambda: Script(act=lambda seen: seen),
+        Constant: lambda: Constant(0.5),
         Option: lambda: Option(
             name="x", about="", draw=lambda *_: 0.5, drawn="", low=0.0, high=1.0
         ),
@@ -555,6 +712,42 @@ HOSTILE: dict[str, Callable[[], Any]] = {
 }  # fmt: skip
 
 
+def hostile(near: Sequence[Any] = ()) -> st.SearchStrategy[Any]:
+    """What an argument may be that nobody has asked for; a text is a name in ``HOSTILE``."""
+    numbers = st.floats() | st.floats(-10.0, 10.0) | st.integers() | st.integers(-5, 50)
+    rows = st.lists(numbers, min_size=1, max_size=5)
+    strange = st.sampled_from(sorted(HOSTILE))
+    return strange | numbers | rows | (st.sampled_from(list(near)) if near else strange)
+
+
+@st.composite
+def cases(draw: Any, surface: Surface) -> "Case":
+    """A call with one or two hostile arguments, if there are any."""
+    names = list(surface.parameters)
+    some = st.lists(st.sampled_from(names), min_size=1, max_size=2, unique=True)
+    chosen = draw(some) if names else []
+    return Case(surface, {name: draw(hostile(surface.named.get(name, ()))) for name in chosen})
+
+
+def tried(surface: Surface, count: int, turn: int = 0) -> list[tuple[str, str]]:
+    """Cases and complaints: so many, the same ones each time; another turn has others."""
+    found: list[tuple[str, str]] = []
+
+    @seed(zlib.crc32(f"{surface.name} {turn}".encode()))
+    @settings(max_examples=count, phases=[Phase.generate], database=None, deadline=None,
+              suppress_health_check=list(HealthCheck))
+    @given(cases(surface))
+    def one(case: Case) -> None:
+        found.append((case.about, case.complaint()))
+
+    one()
+    return found
+
+
+# How a file is refused: by its path, with what is wrong with it.
+_OF_A_FILE = re.compile(r"is no (policy|model)|has no statistics|must be trusted")
+
+
 @dataclass
 class Case:
     """A call: which arguments are hostile, and with what; the others are good."""
@@ -564,13 +757,21 @@ class Case:
 
     def arguments(self) -> dict[str, Any]:
         parameters = self.surface.parameters
-        given = {}
+        given = dict(_made(BY_SURFACE.get(self.surface.name, {}).get("**", {})))
         for name, (hint, default) in parameters.items():
-            if name not in self.hostile and default is inspect.Parameter.empty:
+            needed = default is inspect.Parameter.empty or default is SEVERAL
+            if name not in self.hostile and needed:
                 given[name] = good(hint, name, self.surface.name)
         for name, kind in self.hostile.items():
             given[name] = HOSTILE[kind]() if isinstance(kind, str) else kind
         return given
+
+    @property
+    def about(self) -> str:
+        """The case in words."""
+        said = {name: kind if isinstance(kind, str) else checks.shown(kind)
+                for name, kind in self.hostile.items()}  # fmt: skip
+        return f"{self.surface.name} with {said}"
 
     def complaint(self) -> str:
         """What is wrong with what comes of it; empty if nothing is."""
@@ -583,19 +784,22 @@ class Case:
                 where = nan_in(result)
         except Hangs:
             return f"takes longer than {SECONDS} s"
+        except (KeyboardInterrupt, SystemExit):
+            raise
         except ValueError as error:
             return self._style(str(error))
-        except Exception as error:
+        except BaseException as error:  # of a library in another language, too
             names = {kind.__name__ for kind in type(error).__mro__}
             return "" if names & self.surface.errors else f"{type(error).__name__}: {error}"[:300]
         return f"NaN in {where}" if where else ""
 
     def _style(self, said: str) -> str:
         """Whether a refusal says what is wrong."""
-        if not ("must" in said and "got" in said):
+        if not ("must" in said and "got" in said or _OF_A_FILE.search(said)):
             return f"ValueError without must and got: {said}"[:300]
-        if len(self.hostile) == 1 and not any(name in said for name in self.hostile):
-            return f"ValueError does not name {list(self.hostile)}: {said}"[:300]
+        names = [name.rpartition(".")[2] for name in self.surface.parameters]
+        if not any(word in said for name in names for word in (name, SAID_AS.get(name, name))):
+            return f"ValueError names none of {names}: {said}"[:300]
         if len(said) > 1000:
             return f"ValueError of {len(said)} letters: {said[:200]}"
         return ""

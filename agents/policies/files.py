@@ -40,7 +40,8 @@ KINDS = {"gait": ".json", "network": ".npz", "residual": ".npz"}
 
 
 def _steering(name: str, value: Any) -> tuple[float, ...]:
-    return row(name, value) if np.size(value) else ()
+    empty = isinstance(value, tuple | list) and not value
+    return () if empty else row(name, value)
 
 
 class Policy(Protocol):

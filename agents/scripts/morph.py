@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tca_mj.checks import Checked
+from tca_mj.checks import Checked, number
 from tca_mj.control.morph import ClosedLoop, Measurement, MorphSequence, MorphState
 from tca_mj.control.pi import PiSpec
 from tca_mj.envs.morph import OBSERVATION, MorphModule
@@ -78,7 +78,7 @@ class MorphPolicy(Checked):
 
     def angle_of(self, resistance: float) -> float:
         """Angle [rad] that a resistance [ohm] tells."""
-        return float(self._fit.displacement(resistance))
+        return float(self._fit.displacement(number("resistance", resistance)))
 
     @property
     def phase(self) -> str:

@@ -6,12 +6,14 @@ An argument that its type refuses ends the program with code 2 and the reason.
 import argparse
 import math
 import os
+import re
 from collections.abc import Callable
 from functools import partial
 from inspect import cleandoc
 from pathlib import Path
 from typing import Any, TypeAlias
 
+from tca_mj.checks import LARGEST
 from tca_mj.registry import DEMOS, TASKS, find_task
 
 POLICIES = ("scripted", "off", "random")  # who acts besides saved policies
@@ -100,27 +102,42 @@ def filled(text: str) -> str:
     return text.format(task=TASKS[0].id, demo=next(iter(DEMOS)))
 
 
-def parse_seed(text: str, *, least: int = 0) -> int:
-    """A whole number of at least 0, or ``least``."""
-    if not text.strip().lstrip("-").isdecimal():
-        raise argparse.ArgumentTypeError(f"must be a whole number, got {text!r}")
-    if int(text) < least:
-        raise argparse.ArgumentTypeError(f"must be at least {least}, got {int(text)}")
-    return int(text)
+def parse_seed(text: str, *, least: int = 0, most: int = 2**32 - 1) -> int:
+    """A whole number from ``least`` to ``most``; of seeds the largest that all learners take."""
+    digits = text.strip()
+    if not re.fullmatch(r"[+-]?[0-9]+", digits):
+        raise argparse.ArgumentTypeError(f"must be a whole number, got {_short(text)}")
+    endless = -math.inf if digits[0] == "-" else math.inf
+    number = int(digits) if len(digits) < 100 else endless
+    if not least <= number <= most:
+        bound = f"at least {least}" if number < least else f"at most {most}"
+        raise argparse.ArgumentTypeError(f"must be {bound}, got {_short(digits)}")
+    return int(number)
 
 
-parse_count = partial(parse_seed, least=1)
-
-
-def parse_seconds(text: str) -> float:
-    """A time above 0 [s]."""
+def parse_number(text: str, *, above: float = -math.inf, unit: str = "") -> float:
+    """A finite number above a bound."""
     try:
-        seconds = float(text)
+        number = float(text)
     except ValueError:
-        seconds = math.nan
-    if not 0.0 < seconds < math.inf:
-        raise argparse.ArgumentTypeError(f"must be a number above 0 s, got {text!r}")
-    return seconds
+        number = math.nan
+    if not max(above, -LARGEST) < number <= LARGEST:
+        bound = f" above {above:g}{unit}" if above > -math.inf else ""
+        raise argparse.ArgumentTypeError(f"must be a number{bound}, got {_short(text)}")
+    return number
+
+
+def _short(text: str) -> str:
+    """A word as a message shows it."""
+    return repr(text if len(text) <= 80 else f"{text[:40]}...{text[-20:]}")
+
+
+# How many at most: as the functions behind the commands take them.
+_COUNTS = {
+    "--episodes": 10_000, "--steps": 1_000_000_000, "--workers": 1024, "--envs": 1024,
+    "--seeds": 1000, "--nodes": 128,
+}  # fmt: skip
+parse_seconds = partial(parse_number, above=0.0, unit=" s")
 
 
 def parse_task(text: str) -> str:
@@ -142,7 +159,7 @@ def parse_axis(text: str) -> tuple[str, tuple[Any, ...]]:
     """A setting and its values, from ``NAME=VALUE,VALUE,...``; numbers where they are."""
     name, _, values = text.partition("=")
     if not name or not values:
-        raise argparse.ArgumentTypeError(f"must be NAME=VALUE,..., got {text!r}")
+        raise argparse.ArgumentTypeError(f"must be NAME=VALUE,..., got {_short(text)}")
 
     def value(part: str) -> float | int | str:
         for kind in (int, float):
@@ -180,6 +197,5 @@ _KINDS: dict[str, dict[str, Any]] = {
     "--task": _TASK,
     "--out": {"type": parse_folder},
     "--seed": {"type": parse_seed, "default": 0},
-    **dict.fromkeys(("--episodes", "--steps", "--workers", "--envs", "--seeds"),
-                    {"type": parse_count}),
+    **{name: {"type": partial(parse_seed, least=1, most=most)} for name, most in _COUNTS.items()},
 }

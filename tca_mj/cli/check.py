@@ -1,9 +1,10 @@
 """Figures of the package itself: ``bench`` its speed, ``validate`` and ``certify`` its models."""
 
 import argparse
+from functools import partial
 from pathlib import Path
 
-from tca_mj.cli.arguments import Commands, add, add_command, parse_count
+from tca_mj.cli.arguments import Commands, add, add_command, parse_number
 
 
 def add_commands(commands: Commands) -> None:
@@ -30,15 +31,17 @@ def add_commands(commands: Commands) -> None:
         " modules", nargs="*")  # fmt: skip
     add(certify, "--out", "folder; default: write nothing")
     add(certify, "--seed", "of the modules' cases; default 0")
+    above_0 = partial(parse_number, above=0.0)
     robot = certify.add_argument_group("of a robot that module:function builds")
-    add(robot, "--hot", "temperature of a hot TCA, or one for each; default 120", type=float,
+    add(robot, "--hot", "temperature of a hot TCA, or one for each; default 120", type=parse_number,
         nargs="+", metavar="CELSIUS")  # fmt: skip
-    add(robot, "--gravity", "x, y and z in m/s²; default: the robot's", type=float, nargs=3,
+    add(robot, "--gravity", "x, y and z in m/s²; default: the robot's", type=parse_number, nargs=3,
         metavar=("X", "Y", "Z"))  # fmt: skip
-    add(robot, "--nodes", "argument of the function; default: its own", type=parse_count)
-    add(robot, "--tolerance", "of the tip, in %% of the length; default 1", type=float,
+    add(robot, "--nodes", "argument of the function; default: its own")
+    add(robot, "--tolerance", "of the tip, in %% of the length; default 1", type=above_0,
         metavar="PERCENT")  # fmt: skip
-    add(robot, "--angle", "tolerance of the tip's frame; default 2", type=float, metavar="DEGREES")
+    add(robot, "--angle", "tolerance of the tip's frame; default 2", type=above_0,
+        metavar="DEGREES")  # fmt: skip
     add(robot, "--workers", "processes; default: one per core")
 
 

@@ -14,6 +14,8 @@ from tca_mj.cli.arguments import (
     add_how_trained,
     how_trained,
     parse_axis,
+    parse_number,
+    parse_seconds,
     task_name,
 )
 
@@ -26,11 +28,11 @@ def add_commands(commands: Commands) -> None:
     add(evaluation, "--episodes", "default 10", default=10)
     add(evaluation, "--seed", "of the first episode; default 0")
     add(evaluation, "--randomise", "share by which the robot is drawn to be off, 0 to 0.5;"
-        " default 0", type=float, default=0.0, metavar="SHARE")  # fmt: skip
+        " default 0", type=parse_number, default=0.0, metavar="SHARE")  # fmt: skip
     add(evaluation, "--steps", "of an episode; default: the task's")
     add(evaluation, "--model", "used, or one of the task's finer models, as `list` has it",
         default="used")  # fmt: skip
-    add(evaluation, "--timestep", "of the physics; default: the task's", type=float)
+    add(evaluation, "--timestep", "of the physics; default: the task's", type=parse_seconds)
     add(evaluation, "--out", "folder; default runs/eval/TASK-POLICY")
     add(evaluation, "--workers", "processes; default 1", default=1)
     add(evaluation, "--fresh", "forget what the folder holds", action="store_true")
@@ -46,7 +48,7 @@ def add_commands(commands: Commands) -> None:
     add(train, "--out", "folder; default runs/train/TASK-ALGO")
     add(train, "--workers", "processes of cma; default 2", default=2)
     add(train, "--envs", "environments of ppo, sac, td3 at a time")
-    add(train, "--residual", "correct a gait by at most K kelvin", type=float, metavar="K")
+    add(train, "--residual", "correct a gait by at most K kelvin", type=parse_number, metavar="K")
     add(train, "--video", "film the best network at the end; --no-video leaves that for later",
         action=argparse.BooleanOptionalAction, default=True)  # fmt: skip
     add(train, "--start", "gait to begin with or to correct: scripted (default), trot, a policy's"

@@ -8,12 +8,12 @@ from collections.abc import Sequence
 import mujoco
 import numpy as np
 
-from tca_mj.checks import Array, door, instance, text
+from tca_mj.checks import Array, door, shown
 from tca_mj.hints import nearest
 from tca_mj.model.chain import Chain
 from tca_mj.model.part import Part
 from tca_mj.model.tendon import RoutedTca, lay_tca, route_passes
-from tca_mj.routes import Route
+from tca_mj.routes import AnyRoute
 from tca_mj.tca import CATALOGUE, TcaSpec
 
 VIEW = "view"  # the camera of a stage
@@ -22,10 +22,11 @@ _ROOM = 1.4  # what it sees over the part's size
 _NO_SIZE = 0.1  # size of a part in which nothing is seen [m]
 
 
+@door
 def add_tca(
     part: Part,
     chain: Chain | Sequence[Chain],
-    route: Route,
+    route: AnyRoute,
     tca: TcaSpec | str,
     *,
     name: str | None = None,
@@ -57,23 +58,18 @@ def add_tca(
         >>> add_tca(part, chain, Helix(3e-3), "free-stroke").path_length
         0.045
     """
-    instance("part", part, Part)
-    if isinstance(chain, Chain):
-        chain = [chain]
-    for i, each in enumerate(chain):
-        instance("chain" if len(chain) == 1 else f"chain[{i}]", each, Chain)
     if isinstance(tca, str):
         if tca not in CATALOGUE:
             raise ValueError(
-                f"tca must be a TcaSpec or one of {sorted(CATALOGUE)}, got {tca!r}"
+                f"tca must be a TcaSpec or one of {sorted(CATALOGUE)}, got {shown(tca)}"
                 f"{nearest(tca, CATALOGUE)}"
             )
         tca = CATALOGUE[tca]
-    instance("tca", tca, TcaSpec)
-    name = f"tca{len(part.tcas)}" if name is None else text("name", name)
+    name = f"tca{len(part.tcas)}" if name is None else name
     if name in [other.name for other in part.tcas]:
         raise ValueError(f"name must be new in this part, got {name!r} again")
-    laid = lay_tca(part.spec, tca, route_passes(chain, route), name=name)
+    chains = [chain] if isinstance(chain, Chain) else chain
+    laid = lay_tca(part.spec, tca, route_passes(chains, route), name=name)
     part.tcas = (*part.tcas, laid)
     return laid
 

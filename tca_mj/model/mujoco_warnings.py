@@ -10,6 +10,8 @@ from collections import Counter
 
 import mujoco
 
+from tca_mj.checks import door
+
 _heard: Counter[str] = Counter()
 _asked = False
 
@@ -38,6 +40,7 @@ def warning_counts() -> Counter[str]:
     return Counter(_heard)
 
 
+@door
 def warning_line(counts: Counter[str]) -> str:
     """Warnings in a line, the most frequent first; empty if there are none.
 

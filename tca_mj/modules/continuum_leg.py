@@ -9,7 +9,7 @@ from typing import Annotated
 
 import mujoco
 
-from tca_mj.checks import Checked, Finite, Positive, door, number, whole
+from tca_mj.checks import Angle, Checked, Positive, door, number, whole
 from tca_mj.hints import Length, Mass, Section
 from tca_mj.model.build import add_tca
 from tca_mj.model.chain import Chain, Motion, Nodes, add_chain
@@ -64,7 +64,7 @@ class LegSpec(Checked):
     length: Length = 55e-3
     rod_diameter: Section = 0.5e-3
     offset: Section = 8e-3
-    phase: Finite = 0.0
+    phase: Angle = 0.0
     count: Annotated[int, partial(whole, at_least=2, at_most=100)] = 3
     plate_radius: Section = 9e-3
     plate_thickness: Section = 1e-3

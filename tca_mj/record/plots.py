@@ -8,13 +8,14 @@ from __future__ import annotations
 
 import io
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tca_mj.checks import Array, floats
+from tca_mj.checks import Array, Finite, Share, door, floats, require_one_of, whole, within
 from tca_mj.files import write_whole
 from tca_mj.machine import how_to_install
 
@@ -66,22 +67,31 @@ def temperature_colour(temperature: ArrayLike) -> Array:
 
     Returns:
         sRGB in [0, 1], shape (..., 3).
+
+    Raises:
+        ValueError: If one is no real number.
     """
-    share = (np.asarray(temperature, dtype=np.float64) - COLDEST) / (HOTTEST - COLDEST)
-    share = np.clip(np.nan_to_num(share), 0.0, 1.0)
+    warmer = np.nan_to_num(floats("temperature", temperature), nan=COLDEST) - COLDEST
+    share = np.clip(warmer / (HOTTEST - COLDEST), 0.0, 1.0)
     stops = np.linspace(0.0, 1.0, len(_HEAT))
     return _srgb(*(np.interp(share, stops, column) for column in _HEAT.T))
 
 
-def series_colours(n: int, *, lightness: float = 0.62) -> Array:
+@door
+def series_colours(
+    n: Annotated[int, partial(whole, at_least=0, at_most=10_000)], *, lightness: Share = 0.62
+) -> Array:
     """``n`` colours for the curves of ``n`` TCAs, neighbours far apart in hue.
 
     Args:
-        n: Number of colours.
+        n: Number of colours, 0 to 10 000.
         lightness: Mean OKLab lightness, 0 to 1: about 0.6 on white, 0.75 on black [1].
 
     Returns:
         sRGB in [0, 1], shape (n, 3).
+
+    Raises:
+        ValueError: If a number is out of bounds.
     """
     index = np.arange(n)
     hue = 255.0 + 137.50776 * index  # golden angle: no two hues ever meet
@@ -105,11 +115,12 @@ def event_rows(widths: Sequence[float], positions: Sequence[float]) -> list[int]
     return rows
 
 
+@door
 def rollout_plot(
     path: str | Path, time: ArrayLike, power: ArrayLike, temperature: ArrayLike, tension: ArrayLike,
     bend: ArrayLike, names: Sequence[str], events: Sequence[tuple[float, str]] = (), *,
-    body: ArrayLike | None = None, title: str = "", temperature_limit: float | None = HOTTEST,
-    tension_limit: float | None = BREAKING_FORCE,
+    body: ArrayLike | None = None, title: str = "", temperature_limit: Finite | None = HOTTEST,
+    tension_limit: Finite | None = BREAKING_FORCE,
 ) -> None:  # fmt: skip
     """Draws power, temperature, tension and bend angle of a rollout, one above the other.
 
@@ -130,7 +141,8 @@ def rollout_plot(
 
     Raises:
         ImportError: If Matplotlib is not installed.
-        ValueError: If the shapes do not fit.
+        ValueError: If the shapes do not fit, a time is not finite, or the path's ending is that of
+            no picture.
     """
     try:
         from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -139,7 +151,7 @@ def rollout_plot(
     except ImportError as error:
         raise ImportError(f"the plot needs Matplotlib: {how_to_install('demo')}") from error
 
-    clock = floats("time", time)
+    clock = within("time", time)
     panels = [
         ("power", floats("power", power), None, "W"),
         ("temperature", floats("temperature", temperature), temperature_limit, "°C"),
@@ -154,6 +166,9 @@ def rollout_plot(
         shape = (clock.size,) if label == "bend angle" else (clock.size, len(names))
         if clock.ndim != 1 or clock.size == 0 or values.shape != shape:
             raise ValueError(f"{label} must have shape {shape}, got {values.shape}")
+    warm = None if body is None else floats("body", body)
+    if warm is not None and warm.shape != panels[1][1].shape:
+        raise ValueError(f"body must have the shape of temperature, got {warm.shape}")
 
     figure = Figure(figsize=(11.0, 8.6), dpi=150, facecolor="white")
     canvas = FigureCanvasAgg(figure)
@@ -195,8 +210,7 @@ def rollout_plot(
             axis.set_prop_cycle(color=colours)
             drawn = axis.plot(clock, values, linewidth=1.6)
             lines = lines or drawn
-            if body is not None and label == "temperature":
-                warm = np.broadcast_to(floats("body", body), values.shape)
+            if warm is not None and label == "temperature":
                 axis.plot(clock, warm, linewidth=1.3, linestyle=":")
                 axis.annotate("dotted: the body that a TCA lies in", (0.0, 0.0), (6, 3),
                               "axes fraction", "offset points", color="#5f6368",
@@ -237,5 +251,7 @@ def rollout_plot(
 def save_figure(figure: Any, path: Path, **more: Any) -> None:
     """Writes a figure of Matplotlib's in one go; its format is the ending of the path."""
     memory = io.BytesIO()
-    figure.savefig(memory, format=path.suffix[1:] or "png", **more)
+    known = list(figure.canvas.get_supported_filetypes())
+    form = require_one_of("ending of path", path.suffix[1:] or "png", known)
+    figure.savefig(memory, format=form, **more)
     write_whole(path, memory.getvalue())

@@ -24,14 +24,15 @@ Entities:
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from functools import partial
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Annotated, Any, Protocol
 
 import numpy as np
 import rerun
 from numpy.typing import NDArray
 
-from tca_mj.checks import Array, require_count, require_positive
+from tca_mj.checks import Array, door, floats, instance, number, whole
 from tca_mj.files import Claim, require_room
 from tca_mj.record import shapes
 from tca_mj.record.layout import QUANTITIES, Group, blueprint, groups, line_styles
@@ -43,6 +44,10 @@ __all__ = ["QUANTITIES", "Recorded", "Recorder"]
 _FIRST, _MORE = 1 << 22, 1 << 20  # for geometry and layout; for a chunk besides its numbers [bytes]
 _CONTENTS = 1000  # of the table of contents, for each entity and chunk [bytes]
 _PATIENCE = 60.0  # until a file is given up that does not take what was sent [s]
+
+Every = Annotated[int, partial(whole, at_least=1, at_most=1_000_000)]
+Chunk = Annotated[int, partial(whole, at_least=1, at_most=10_000)]  # 100 MB of the largest robot
+Radius = Annotated[float, partial(number, above=0.0, at_most=1.0, unit="m")]
 
 # What is sent, and as what.
 _POSITION = rerun.Transform3D.descriptor_translation(), rerun.components.Translation3DBatch
@@ -97,9 +102,10 @@ class Recorder(Closing):
     A file is written by one recorder at a time. One that has been finished is overwritten.
     """
 
+    @door
     def __init__(
         self, simulation: Recorded, path: str | Path, *, application_id: str = "tca-mj",
-        every: int = 1, chunk: int = 100, tca_radius: float | None = None, footer: bool = True,
+        every: Every = 1, chunk: Chunk = 100, tca_radius: Radius | None = None, footer: bool = True,
     ) -> None:  # fmt: skip
         """Opens the file and writes geometry and layout.
 
@@ -107,23 +113,20 @@ class Recorder(Closing):
             simulation: What to record; its model must stay the same.
             path: File to write, usually ending in ``.rrd``; its folder is made if it is missing.
             application_id: Name under which the viewer keeps layouts and groups recordings.
-            every: Records every so many-th frame.
-            chunk: Recorded frames that are collected before they are written; twice as many
-                cost half the time per frame, and more are lost when the process is killed.
-            tca_radius: Radius of the drawn TCAs [m]; None for the tendon's own width, but no less
-                than 1/400 of the robot's size.
+            every: Records every so many-th frame, up to every millionth.
+            chunk: Recorded frames that are collected before they are written, up to 10 000; twice
+                as many cost half the time per frame, and more are lost when the process is killed.
+            tca_radius: Radius of the drawn TCAs, at most 1 m [m]; None for the tendon's own width,
+                but no less than 1/400 of the robot's size.
             footer: Ends the file with a table of contents. Until then it is kept in memory, about
                 0.8 kB per entity and chunk; without it memory is constant, but
                 ``rerun rrd verify`` objects to the file.
 
         Raises:
-            ValueError: If a number is not positive, or not whole where it counts, or another
+            ValueError: If a number is out of bounds, or not whole where it counts, or another
                 recorder writes this file now, in this process or another one.
             OSError: If the file cannot be written.
         """
-        require_count(every=every, chunk=chunk)
-        if tca_radius is not None:
-            require_positive(tca_radius=tca_radius)
         self.simulation, self.path = simulation, Path(path)
         self._every, self._chunk = every, chunk
         self._calls = self._filled = self._chunks = 0
@@ -178,7 +181,9 @@ class Recorder(Closing):
 
         Raises:
             RuntimeError: If the recorder is closed.
+            ValueError: If a term is no number.
         """
+        rewards = _terms({} if reward_terms is None else reward_terms)
         time, step = self._now(), self._calls
         self._calls += 1
         if step % self._every:
@@ -195,10 +200,10 @@ class Recorder(Closing):
             self._quaternion[:, i] = data.xquat[self._bodies]
             for strips, start, count in zip(self._strips, starts, counts, strict=True):
                 strips[i] = points[start : start + count].astype(np.float32)
-        for term, value in (reward_terms or {}).items():
+        for term, value in rewards.items():
             frames, values = self._rewards.setdefault(term, ([], []))
             frames.append(i)
-            values.append(float(value))
+            values.append(value)
         self._filled += 1
         if self._filled == self._chunk:
             self._write()
@@ -220,7 +225,9 @@ class Recorder(Closing):
 
         Raises:
             RuntimeError: If the recorder is closed.
+            ValueError: If it is no text.
         """
+        instance("text", text, str)
         if self._calls == 0:
             self.frame()
         self._events.append((self._now(), self._calls, text))
@@ -358,3 +365,16 @@ def _times(clock: Array, steps: NDArray[np.int64]) -> list[rerun.TimeColumn]:
         rerun.TimeColumn("sim_time", duration=nanoseconds),
         rerun.TimeColumn("step", sequence=steps),
     ]
+
+
+def _terms(given: Mapping[str, float]) -> dict[str, float]:
+    """Terms of a reward; what has diverged may be no number."""
+    instance("reward_terms", given, Mapping)
+    found = {}
+    for name, value in given.items():
+        instance("names of reward_terms", name, str)
+        array = floats(f"reward_terms[{name!r}]", value)
+        if array.size != 1:
+            raise ValueError(f"reward_terms[{name!r}] must be one number, got {value!r}")
+        found[name] = array.item()
+    return found

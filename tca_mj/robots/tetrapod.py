@@ -19,9 +19,9 @@ from typing import Annotated, Any
 
 import mujoco
 
-from tca_mj.checks import Checked, Finite, Positive, door
+from tca_mj.checks import Checked, Finite, Positive, door, whole
 from tca_mj.hints import Length, Mass, Section, angle
-from tca_mj.model.chain import Chain, Motion, Nodes, add_chain
+from tca_mj.model.chain import Chain, Motion, add_chain
 from tca_mj.model.part import Part, new_spec
 from tca_mj.model.spine import lumped_torsion, route_spine, sheath
 from tca_mj.model.surface import TOUCHES_NOTHING, surface
@@ -37,6 +37,8 @@ LEGS = ("front_left", "front_right", "rear_left", "rear_right")  # names, in ord
 SIDES = {"left": 1.0, "right": -1.0}  # the sign of y
 SPINES = 3  # how many
 
+MOST_NODES = 32  # of a leg or half of a spine: with 32 each a physics step takes a second
+FewNodes = Annotated[int, partial(whole, at_least=1, at_most=MOST_NODES)]
 _Bend = Annotated[float, partial(angle, above=-math.pi, below=math.pi)]
 # Stiffness of what is round a spine (tube, wires) over that of the soft spine. Estimate.
 _SHEATH = 0.01
@@ -64,10 +66,11 @@ class TetrapodSpec(Checked):
             about 25 mm high.
         belly_friction: Coefficient of friction of spines and rails. Estimate: printed plastic and
             epoxy on glass.
-        nodes: Nodes of each half of the spines.
+        nodes: Nodes of each half of the spines, 1 to 32, as of each leg.
 
     Raises:
-        ValueError: If a dimension is not finite and positive, or a number not whole.
+        ValueError: If a dimension is not finite and positive, or a number not whole or out of
+            bounds.
     """
 
     leg: LegSpec = field(default_factory=LegSpec)
@@ -83,7 +86,11 @@ class TetrapodSpec(Checked):
     leg_station: Length = 62e-3
     leg_height: Section = 6e-3
     belly_friction: Positive = 0.3
-    nodes: Nodes = 4
+    nodes: FewNodes = 4
+
+    def __post_init__(self) -> None:
+        Checked.__post_init__(self)
+        whole("leg.nodes", self.leg.nodes, at_most=MOST_NODES)
 
     @property
     def places(self) -> tuple[float, ...]:
@@ -140,7 +147,7 @@ def tetrapod(spec: TetrapodSpec | None = None) -> Part:
 
 @door
 def rigid_tetrapod(
-    spec: TetrapodSpec | None = None, *, bend: Finite = 0.0, nodes: Nodes = 8
+    spec: TetrapodSpec | None = None, *, bend: Finite = 0.0, nodes: FewNodes = 8
 ) -> Part:
     """Builds the robot of ``tetrapod`` with cold spines: its body is rigid, its legs alone move.
 

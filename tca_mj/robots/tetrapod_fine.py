@@ -9,22 +9,25 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from functools import partial
-from typing import Annotated
 
 import mujoco
 
-from tca_mj.checks import door, whole
+from tca_mj.checks import door
 from tca_mj.model.build import add_tca
-from tca_mj.model.chain import MOTIONS, Chain, Motion, Nodes, add_chain
+from tca_mj.model.chain import MOTIONS, Chain, Motion, add_chain
 from tca_mj.model.part import Part
 from tca_mj.model.spine import route_spine
-from tca_mj.robots.tetrapod import TetrapodSpec, attach_legs, dress, route_spine_tca, trunk
+from tca_mj.robots.tetrapod import (
+    FewNodes,
+    TetrapodSpec,
+    attach_legs,
+    dress,
+    route_spine_tca,
+    trunk,
+)
 from tca_mj.routes import UTurn
 from tca_mj.smp.lumped import in_tube
 
-# Six halves of spines whose joints the welds tie together: with 32 a step takes half a second.
-FineNodes = Annotated[int, partial(whole, at_least=1, at_most=32)]
 _LEG_MOTIONS: tuple[Motion, ...] = ("bend_x", "bend_y", "twist")
 
 # The welds hardly give: MuJoCo's default is softer than the spines in their plane. It takes a time
@@ -37,14 +40,14 @@ _WELD = [0.0] * 10 + [1.0, 0.0]
 
 @door
 def fine_tetrapod(
-    spec: TetrapodSpec | None = None, *, nodes: FineNodes = 6, leg_nodes: Nodes = 10
+    spec: TetrapodSpec | None = None, *, nodes: FewNodes = 6, leg_nodes: FewNodes = 10
 ) -> Part:
     """Builds the robot of ``tetrapod`` with more degrees of freedom; names are the same.
 
     Args:
         spec: The robot, but for its numbers of nodes and the motions of its legs.
         nodes: Nodes of each half of each spine, 1 to 32.
-        leg_nodes: Nodes of each leg.
+        leg_nodes: Nodes of each leg, 1 to 32.
 
     Returns:
         A part with the TCAs, spines and sites of ``tetrapod``. The chains of the spines are

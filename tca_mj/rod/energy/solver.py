@@ -37,6 +37,7 @@ _ESCAPE = 0.1  # step away from a saddle
 _QUICK, _PATIENT = 10, 200  # steps of Newton's method where it goes straight, and where not
 _HALVINGS = 30
 _SMALLEST = 1 / 64  # step of the load
+_SHIFTS = 60  # of the Hessian, until they are 1e32 of the body's stiffness
 _COLLAPSE = 0.05  # |w| of a strand, to which a failure is put down
 
 
@@ -131,7 +132,7 @@ def _newton_step(potential: Potential, state: State) -> tuple[Array, bool]:
     hessian, twist = potential.hessian(state)
     gradient, body = potential.gradient(state).ravel(), potential.metric.ravel()
     shift = 0.0  # of the whole matrix, in units of the body's stiffness
-    while True:
+    for _ in range(_SHIFTS):
         shifted = hessian + np.diag(shift * body)
         if potential.conservative:
             step = _solved_convex(shifted, -gradient)
@@ -140,6 +141,7 @@ def _newton_step(potential: Potential, state: State) -> tuple[Array, bool]:
         if step is not None:
             return step.reshape(state.strain.shape), shift <= _NEUTRAL
         shift = max(4.0 * shift, 0.01) if shift else _NEUTRAL
+    raise RodSolveError("no stiffness makes the energy convex", _left(potential, state))
 
 
 def _solved_convex(matrix: Array, right: Array) -> Array | None:

@@ -9,11 +9,13 @@ import math
 import numpy as np
 
 from tca_mj.checks import Array
+from tca_mj.rod.errors import RodSolveError
 from tca_mj.rod.lie import hat, matrix_quaternion, quaternion_matrix, quaternion_product
 from tca_mj.rod.problem import Segment, StaticProblem
 from tca_mj.rod.sections import Sections, place
 from tca_mj.rod.shooting.collocation import NODES, Steps, half_turn, in_section
 
+FINEST = 2000  # steps of the last mesh
 _PER_TURN = 3  # steps of the first mesh per turn of a strand or of the unloaded body
 _FEWEST = 4  # steps of the first mesh
 _PROBES = np.linspace(0.0, 1.0, 129)  # where a route is looked at for its turns
@@ -58,11 +60,15 @@ class Series:
             self.base[k] = load = load + self.segments[k].beam.length * self.line_load[k]
 
     def first_mesh(self, finer: int) -> list[Array]:
-        """Nodes of each segment, from 0 to 1, on a mesh ``finer`` times as fine as the first."""
-        return [
-            np.linspace(0.0, 1.0, 1 + finer * max(_FEWEST, math.ceil(_PER_TURN * _turns(each))))
-            for each in self.segments
-        ]
+        """Nodes of each segment, from 0 to 1, on a mesh ``finer`` times as fine as the first.
+
+        Raises:
+            RodSolveError: If the routes turn so often that it would be too fine.
+        """
+        steps = [max(_FEWEST, math.ceil(_PER_TURN * _turns(each))) for each in self.segments]
+        if sum(steps) > FINEST:
+            raise RodSolveError("the finest mesh is too coarse for the turns of routes", math.inf)
+        return [np.linspace(0.0, 1.0, 1 + finer * count) for count in steps]
 
     def sections(self, k: int, at: Array) -> Sections:
         """Sections of segment k, ``at`` from 0 to 1."""

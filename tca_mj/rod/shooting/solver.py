@@ -23,7 +23,7 @@ from tca_mj.rod.shape import RodShape
 from tca_mj.rod.shooting.collocation import STAGES, half_product, in_section
 from tca_mj.rod.shooting.equations import Look, Mesh, State, drag
 from tca_mj.rod.shooting.refinement import differences, refined, sample
-from tca_mj.rod.shooting.series import Series
+from tca_mj.rod.shooting.series import FINEST, Series
 from tca_mj.rod.solving import load_up, nudge, with_finer_meshes
 
 _Found = tuple[State, Look]
@@ -37,7 +37,6 @@ _FLAT = 1e-6  # share of the smallest compliance that rounding errors may reach
 _NEAR = 1e-4  # residual at which it may be a neutral mode that keeps Newton's method from its goal
 _HOLD = 1e-5  # drag that holds it, in units of moment per turn
 _SOFT = 1e5  # compliance of a mode that counts as neutral, in turn per unit of moment
-_FINEST = 2000  # steps of the last mesh
 _SPREAD = 0.01  # steps are halved that change by more than this share of the largest change
 _CHANGE = 2e-8  # allowed change by the last refinement; 1/256 of it is left
 
@@ -77,8 +76,10 @@ def _converged(series: Series) -> tuple[Mesh, State, Look]:
             return finer, *found
         previous = change
         again = local > _SPREAD * float(local.max())
+        if not again.any():  # what is not a number is never larger
+            raise RodSolveError("the mesh finds no end", change)
         mesh, (state, look), marked = finer, found, again[parent]
-        if len(marked) + int(marked.sum()) > _FINEST:
+        if len(marked) + int(marked.sum()) > FINEST:
             raise RodSolveError("the finest mesh is too coarse", change)
 
 
