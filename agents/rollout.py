@@ -88,7 +88,8 @@ def tally(sums: dict[str, float], reward: float, info: Mapping[str, Any]) -> Non
 
 
 def earned(steps: Iterable[Step]) -> dict[str, float]:
-    """Sums over a whole episode: ``return``, ``length``, ``success``, and each reward term.
+    """Sums over a whole episode: ``return``, ``length``, ``success``, each reward term, and the
+    ``speed`` [m/s] where there is one.
 
     Args:
         steps: The steps, as ``rollout`` yields them.
@@ -96,6 +97,8 @@ def earned(steps: Iterable[Step]) -> dict[str, float]:
     sums = defaultdict(float, dict.fromkeys(("return", "length", "success"), 0.0))
     for number, step in enumerate(steps):
         sums["success"] = float(step.info["success"])
+        if "speed" in step.info:
+            sums["speed"] = float(step.info["speed"])
         if number:
             tally(sums, step.reward, step.info)
     return dict(sums)

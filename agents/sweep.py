@@ -29,10 +29,10 @@ from tca_mj.checks import Checked, door, require_one_of, shown, whole
 from tca_mj.files import claimed, write_whole
 from tca_mj.machine import machine, versions
 from tca_mj.pages import table
+from tca_mj.registry import ALGORITHMS
 
 TRIALS, RESULT = "trials", "result.json"
 TABLE, PAGE, ABOUT = "results.csv", "results.md", "sweep.json"
-ALGORITHMS = ("cma", "ppo", "sac", "td3")
 
 Value = float | int | str
 MOST_TRIALS = 10_000
@@ -49,8 +49,9 @@ class Sweep(Checked):
         axes: Values by name; all combinations are run. Names are fields of ``Evaluation``,
             ``design.PATH`` for a figure of the robot (see ``tca_mj.agents.design.robot_of``), and
             with an algorithm ``train.FIELD`` or ``train.learner.FIELD`` of the training's settings.
-        algorithm: Whether a policy is trained first, and how: one of ``ALGORITHMS``. What is
-            evaluated is then the best policy of the run. Training is on the default robot.
+        algorithm: Whether a policy is trained first, and how: one of
+            ``tca_mj.registry.ALGORITHMS``. What is evaluated is then the best policy of the
+            run. Training is on the default robot.
 
     Raises:
         ValueError: If a name is unknown, a value cannot be, an axis has no value or one twice, or

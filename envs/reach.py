@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from tca_mj.checks import door
 from tca_mj.envs.hanging import CLAMP, PERIOD, TCAS, NoRest, StaticTip
 from tca_mj.envs.options import Constant, Option, Options, Setup, variation_options
+from tca_mj.envs.recipe import Recipe
 from tca_mj.envs.table import Entry, Table
 from tca_mj.envs.task import SimulatedTask, TaskArguments, Verdict
 from tca_mj.envs.vector import TaskVector
@@ -104,8 +105,7 @@ class BendReach(SimulatedTask):
     scripted = "tca_mj.agents.scripts.reach:scripted"
     scripted_arguments = {"action": "power"}
     robot_argument = ("module_spec", BendingSpec)
-    learning_steps = {"ppo": 60_000, "sac": 60_000}
-    learning_arguments = {"action": "power"}
+    recipes = dict.fromkeys(("sac", "ppo"), Recipe(steps=60_000, action="power"))
 
     @door
     def __init__(

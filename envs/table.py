@@ -130,15 +130,21 @@ class Table:
         """Centre and scale of every number, shape (2, size)."""
         return np.array([self._centre, self._scale])
 
-    def mirrored(self, array: NDArray[Any]) -> NDArray[Any]:
-        """What a mirror that swaps left and right makes of an array, shape (..., size).
+    @property
+    def mirror(self) -> tuple[NDArray[np.int64], NDArray[np.float32]]:
+        """What a mirror that swaps left and right does: where each number comes from, and its sign.
 
         Raises:
             ValueError: If no row says how.
         """
         if not self.symmetric:
             raise ValueError("the table must have a mirror in one of its rows, got none")
-        return array[..., self._source] * self._sign
+        return self._source, self._sign
+
+    def mirrored(self, array: NDArray[Any]) -> NDArray[Any]:
+        """What it makes of an array, shape (..., size), also a scaled one; errors as ``mirror``."""
+        source, sign = self.mirror
+        return array[..., source] * sign
 
     @property
     def space(self) -> Any:

@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from tca_mj.checks import door, quantity, require_one_of, shown, some, whole
 from tca_mj.envs.options import Option, Options, Setup, variation_of, variation_options
+from tca_mj.envs.recipe import Recipe
 from tca_mj.envs.table import Entry, Table, commands
 from tca_mj.model.part import Part
 from tca_mj.record.render import Offscreen, Pixels, colour_tendons
@@ -170,9 +171,7 @@ class SimulatedTask(gym.Env[Observation, Action], ABC):
         legs: Legs, each with the same TCAs, that a gait can drive; 0 if none can.
         film_speed: Simulated seconds per second of film.
         published_speed: Speeds of the real robot by the stage that shows them [m/s].
-        learning_steps: Steps by algorithm after which the task was learned.
-        learning_options: Options of every reset in training.
-        learning_arguments: Arguments of ``__init__`` in training.
+        recipes: How it is learned, by algorithm; the first is what was best.
         finer: Finer models of the robot by name: each turns the specification into arguments of
             ``__init__``, the finer specification among them.
         scene: What builds the robot in its scene from its specification.
@@ -206,9 +205,7 @@ class SimulatedTask(gym.Env[Observation, Action], ABC):
     legs: ClassVar[int] = 0
     film_speed: ClassVar[float] = 8.0
     published_speed: ClassVar[Mapping[str, float]] = {}
-    learning_steps: ClassVar[Mapping[str, int]] = {}
-    learning_options: ClassVar[Mapping[str, float]] = {}
-    learning_arguments: ClassVar[Mapping[str, Any]] = {}
+    recipes: ClassVar[Mapping[str, Recipe]] = {}
 
     sim: Simulation
     observation: Table

@@ -11,8 +11,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tca_mj.assets import mjcf
-from tca_mj.checks import door, require_one_of
+from tca_mj.checks import door, number, require_one_of
+from tca_mj.envs.command import Command, Following, command_options, commanded, drawn
 from tca_mj.envs.options import Constant, Option, Options, Setup, Uniform, variation_options
+from tca_mj.envs.recipe import Recipe
 from tca_mj.envs.stance import CAMERAS, LEG_TCAS, Stance, tetrapod_scene
 from tca_mj.envs.table import Entry, Table
 from tca_mj.envs.task import Headway, SimulatedTask, TaskArguments, TaskState, Verdict, parts
@@ -38,6 +40,11 @@ OBSERVATION = Table(
               mirror=(2, 1, 4, 3)),
         Entry("body bend", 1, -6.3, 6.3, "rad"),
         Entry("commanded direction", 2, -1.0, 1.0, "-", mirror=(1, -2)),
+        Entry("commanded speed", 1, 0.0, 1.0, "m/s", centre=0.01, scale=0.01),
+        Entry("lead", 1, -10.0, 10.0, "m", scale=0.02),
+        Entry("way aside", 1, -10.0, 10.0, "m", scale=0.05, mirror=(-1,)),
+        Entry("commanded turning", 1, -1.0, 1.0, "rad/s", scale=0.05, mirror=(-1,)),
+        Entry("heading error", 1, -3.2, 3.2, "rad", scale=0.3, mirror=(-1,)),
     ]
 )  # fmt: skip
 ACTION = Table([Entry("TCA heating", LEG_TCAS, -1.0, 1.0, "-", off=-1.0, mirror=_SIDES)])
@@ -52,12 +59,18 @@ class GaitTask:
         speed: The published speed [m/s]; Sun, Section 6.3.2.
         beam: Height of the beam that the robot stands astride of, or None for the ground [m].
         yaw_range: Largest angle by which the robot may look aside at the start [rad].
+        fastest: Commanded speed that means as fast as it can [m/s].
+        turning: Largest commanded rate of turning [rad/s].
+        ways: Directions that can be commanded [rad]; empty for all.
     """
 
     bend: float
     speed: float
     beam: float | None = None
     yaw_range: float = 0.05
+    fastest: float = 0.012
+    turning: float = 0.05
+    ways: tuple[float, ...] = ()
 
 
 TASKS = {
@@ -66,15 +79,23 @@ TASKS = {
     "walk": GaitTask(bend=math.radians(93.0), speed=9e-3),
     # Sun prints neither the angle of the U nor the beam. Both (the beam in beam.xml, 34 mm wide)
     # are chosen so that legs press the beam while they are nearly straight: bent, they twist.
-    "shimmy": GaitTask(bend=math.radians(215.0), speed=0.75e-3, beam=0.12, yaw_range=0.005),
+    "shimmy": GaitTask(bend=math.radians(215.0), speed=0.75e-3, beam=0.12, yaw_range=0.005,
+                       turning=0.0, ways=(0.0, math.pi)),
 }
 
 # Updates of the TCAs in a control step, at least. With one in every physics step the searched walk
 # is 1.0 % slower, the other gaits 0.3 % or less; with a single one the scripted walk is 1.2 %
 # faster: scripts/tetrapod_contacts.py.
 _UPDATES = 2
+# Of SAC. The temperature holds for half a second, in which a TCA comes half the way.
+_LEARNER = {
+    "learning_rate": 1e-3, "batch_size": 256, "tau": 0.01, "ent_coef": "auto_0.05",
+    "learning_starts": 1000, "gradient_steps": 8, "hidden": (128, 128), "buffer_size": 50_000,
+}  # fmt: skip
 _SETTLING = 0.5  # time in which the robot comes to rest after it is put down [s]
 _UPRIGHT = 0.5  # cosine of the tilt from which on it has fallen over
+_STEEPEST = math.radians(10.0)  # largest slope of the ground [rad]
+_GOLDEN = math.radians(137.5)  # angle between two pushes: they come from all sides
 _SUNK = 12e-3  # depth below its first height at which it has fallen off the beam [m]
 
 
@@ -138,7 +159,7 @@ class TetrapodGait(SimulatedTask):
     max_power: ClassVar[float] = 4.0
     max_temperature: ClassVar[float] = 180.0  # annealing temperature, Sun, Table 2.1 [°C]
     hot_temperature: ClassVar[float] = 172.0  # from here on heat is charged [°C]
-    terms = ("progress", "drift", "posture", "energy", "heat", "end")
+    terms = ("progress", "drift", "lead", "turn", "posture", "energy", "heat", "end")
     energy_price, heat_price, end_price = 0.002, 0.002, 5.0
     cameras = CAMERAS  # all follow the robot
     scripted = "tca_mj.agents.scripts.tetrapod:scripted"
@@ -146,7 +167,13 @@ class TetrapodGait(SimulatedTask):
     robot_argument = ("robot", TetrapodSpec)
     finer = {"legs": _fine_legs, "fine": _fine_body}
     legs = len(LEGS)
-    learning_options = {"randomise": 0.2}
+    # By which of what was tried, and how: docs/training.md.
+    recipes = {
+        "sac": Recipe(
+            steps=12_000, control_period=0.5, timestep=10e-3, options={"randomise": 0.2},
+            scaled=True, mirrored=True, discount=0.94, interval=1000, learner=_LEARNER,
+        ),
+    }  # fmt: skip
     bend_range: ClassVar[float] = math.radians(1.0)  # largest deviation of the body's bend [rad]
 
     @door
@@ -193,11 +220,10 @@ class TetrapodGait(SimulatedTask):
             {"TCA length": (0.0, longest), "foot position": (-size, size), "height": (-size, size)}
         )
         self._open(sim, seen, ACTION, self._options(), **common)
-        self._forward = np.array([1.0, 0.0])
-        self._start = np.zeros(3)
-        self._along, self._aside = 0.0, 0.0
-        self._bend = self.task.bend
-        self._progress = self._measure()
+        self._following = Following(Command())
+        self._until, self._wander, self._first = math.inf, 0.0, 0.0
+        self._bend, self._gravity = self.task.bend, (0.0, 0.0, -9.81)
+        self._push, self._pushes, self._push_every, self._push_way = 0.0, 0, 1.0, 0.0
         self._try("robot", robot)
 
     def _options(self) -> Options:
@@ -214,10 +240,27 @@ class TetrapodGait(SimulatedTask):
                     name="bend", about="bend of its body", unit="rad", low=bends[0], high=bends[1],
                     draw=self._draw_bend, drawn="drawn",
                 ),
+                *command_options(fastest=task.fastest, turning=task.turning, ways=task.ways),
                 Option(
-                    name="direction", about="commanded direction, from world x to y", unit="rad",
-                    low=-math.pi, high=math.pi, check=self._check_direction, draw=Constant(0.0),
-                    drawn="0",
+                    name="slope", about="slope of the ground", unit="rad", low=-_STEEPEST,
+                    high=_STEEPEST, draw=Constant(0.0), drawn="0",
+                ),
+                Option(
+                    name="slope_direction", about="where it rises to, from world x to y",
+                    unit="rad", low=-math.pi, high=math.pi, draw=Constant(0.0), drawn="0",
+                ),
+                Option(
+                    name="push", about="velocity by which the robot is pushed now and then",
+                    unit="m/s", low=0.0, high=0.2, draw=Constant(0.0), drawn="0",
+                ),
+                Option(
+                    name="push_every", about="time between pushes", unit="s", low=1.0, high=600.0,
+                    draw=Constant(20.0), drawn="20",
+                ),
+                Option(
+                    name="push_direction", about="of the first push, from world x to y; each"
+                    " other is turned by 137.5°", unit="rad", low=-math.pi, high=math.pi,
+                    draw=Uniform(-math.pi, math.pi), drawn="drawn",
                 ),
                 *variation_options(),
             ]
@@ -226,57 +269,106 @@ class TetrapodGait(SimulatedTask):
     def _draw_bend(self, random: np.random.Generator, setup: Setup) -> float:
         return self.task.bend + random.uniform(-self.bend_range, self.bend_range)
 
-    def _check_direction(self, value: Any) -> None:
-        if self.task.beam is not None and abs(math.sin(value)) > 1e-6:
-            raise ValueError(f"direction must be 0 or pi on a beam, got {value}")
-
     def prepare(self, setup: Setup) -> None:
         """Puts the robot down, where it comes to rest."""
-        self._bend = setup["bend"]
+        task = self.task
+        self._bend, slope, uphill = setup["bend"], setup["slope"], setup["slope_direction"]
+        across, down = -9.81 * math.sin(slope), -9.81 * math.cos(slope)
+        self._gravity = across * math.cos(uphill), across * math.sin(uphill), down
+        self.model.opt.gravity[:] = self._gravity
         self.sim.reset(
-            self.stance.placer(bend=self._bend, yaw=setup["yaw"], above=self.task.beam or 0.0)
+            self.stance.placer(bend=self._bend, yaw=setup["yaw"], above=task.beam or 0.0)
         )
         self.sim.step(np.zeros(self.sim.n), _SETTLING)
         self.data.time = 0.0
-        direction = setup["direction"]
-        self._forward = np.array([math.cos(direction), math.sin(direction)])
-        self._start = self.stance.position(self.data).copy()
-        self._progress = self._measure()
+        self._first = float(self.stance.position(self.data)[2])
+        self._following = Following(commanded(setup, task.fastest), place=self._place()).moved(
+            *self._place(), self._yaw(), 0.0
+        )
+        self._wander, self._until = setup["wander"], math.inf
+        if self._wander:
+            self._draw_command()
+        self._push, self._pushes = setup["push"], 0
+        self._push_every, self._push_way = setup["push_every"], setup["push_direction"]
+
+    def order(
+        self,
+        *,
+        direction: float | None = None,
+        speed: float | None = None,
+        turning: float | None = None,
+        heading: float | None = None,
+    ) -> None:
+        """Gives another command, from the next step on; what is left out stays as it is.
+
+        Args:
+            direction: Of travel, from the commanded heading to its left [rad].
+            speed: From the task's ``fastest`` on as fast as the robot can [m/s].
+            turning: Rate at which the commanded heading turns to the left [rad/s].
+            heading: The commanded heading, from world x to y [rad].
+
+        Raises:
+            ValueError: As the options of ``reset``.
+        """
+        old = self._following.command
+        rows = {row.name: row for row in self.options.rows}
+        given = {"direction": direction, "speed": speed, "turning": turning}
+        kept = old._asdict() | {
+            name: rows[name].checked(value) for name, value in given.items() if value is not None
+        }
+        if kept["speed"] >= self.task.fastest:
+            kept["speed"] = math.inf
+        self._following = self._following.told(Command(**kept))
+        if heading is not None:
+            self._following = self._following._replace(heading=number("heading", heading))
+
+    def _draw_command(self) -> None:
+        task = self.task
+        command, time = drawn(
+            self.np_random, self._wander, fastest=task.fastest, turning=task.turning, ways=task.ways
+        )
+        self._following = self._following.told(command)
+        self._until = self.sim.time + time
+
+    def _place(self) -> tuple[float, float]:
+        x, y, _ = self.stance.position(self.data).tolist()
+        return x, y
+
+    def _yaw(self) -> float:
+        turn = self.stance.rotation(self.data)
+        return math.atan2(turn[1, 0], turn[0, 0])
 
     def set_state(self, state: TaskState) -> None:
-        """As every task's; a rigid body gets its shape back."""
+        """As every task's; a rigid body gets its shape back, the ground its slope."""
         super().set_state(state)
         self.stance.shape(self._bend)
+        self.model.opt.gravity[:] = self._gravity
 
     def drive(self, command: NDArray[np.float64]) -> Drive:
         """What the legs' TCAs are told; see the class."""
+        if self._push and self.sim.time >= (self._pushes + 1) * self._push_every - 1e-9:
+            way = self._push_way + self._pushes * _GOLDEN
+            root = self.stance.motion
+            self.data.qvel[root : root + 2] += self._push * np.array([math.cos(way), math.sin(way)])
+            self._pushes += 1
         return Drive(command=self.heated(command))
 
     def judge(self, drive: Drive, harmed: bool) -> Verdict:
         """Headway, and whether the robot has fallen."""
-        before, self._progress = self._progress, self._measure()
+        before = self._following
+        self._following = before.moved(*self._place(), self._yaw(), self.interval)
         tilt = 1.0 - float(self.stance.rotation(self.data)[2, 2])
-        terms = {name: value - before[name] for name, value in self._progress.items()}
-        posture = -0.2 * self.share * tilt
-        return Verdict(terms=terms | {"posture": posture}, ended=self._fallen(tilt))
-
-    def _measure(self) -> dict[str, float]:
-        """How far the robot has got, by reward term."""
-        x, y, _ = (self.stance.position(self.data) - self._start).tolist()
-        forward_x, forward_y = self._forward.tolist()
-        # Distances from the start along the commanded direction and to the left of it [m].
-        self._along = forward_x * x + forward_y * y
-        self._aside = forward_x * y - forward_y * x
-        return {
-            "progress": self._along / self.task.speed,
-            "drift": -0.5 * abs(self._aside) / self.task.speed,
-        }
+        terms = self._following.earned(before, self.task.speed)
+        terms["posture"] = -0.2 * self.share * tilt
+        if self.sim.time >= self._until - 1e-9:
+            self._draw_command()
+        return Verdict(terms=terms, ended=self._fallen(tilt), seen=self._told())
 
     def _fallen(self, tilt: float) -> str | None:
         """How the robot has fallen, or None."""
         if tilt > 1.0 - _UPRIGHT:
             return "fell over"
-        if self.task.beam and self.stance.position(self.data)[2] < self._start[2] - _SUNK:
+        if self.task.beam and self.stance.position(self.data)[2] < self._first - _SUNK:
             return "fell off the beam"
         return None
 
@@ -296,16 +388,30 @@ class TetrapodGait(SimulatedTask):
             "foot position": stance.feet_in_body(data),
             "leg contact": stance.touching(data),
             "body bend": stance.bend(data),
-            "commanded direction": self._forward @ stance.rotation(data)[:2, :2],
+            **self._told(),
+        }
+
+    def _told(self) -> dict[str, ArrayLike]:
+        """Rows of the observation that say what is commanded, and how well it is followed."""
+        now = self._following
+        course = np.array([math.cos(now.course), math.sin(now.course)])
+        return {
+            "commanded direction": course @ self.stance.rotation(self.data)[:2, :2],
+            "commanded speed": min(now.command.speed, self.task.fastest),
+            "lead": now.lead,
+            "way aside": now.aside,
+            "commanded turning": now.command.turning,
+            "heading error": now.error,
         }
 
     def details(self) -> dict[str, Any]:
         """Headway [m] and speed [m/s]."""
         time = self.sim.time
         return {
-            "distance": self._along,
-            "drift": self._aside,
-            "speed": self._along / time if time > 0.0 else 0.0,
+            "distance": self._following.along,
+            "drift": self._following.aside,
+            "heading_error": self._following.error,
+            "speed": self._following.along / time if time > 0.0 else 0.0,
         }
 
     def bent(self) -> float:
@@ -315,7 +421,8 @@ class TetrapodGait(SimulatedTask):
     def headway(self) -> Headway:
         """From where it was put down."""
         weight = 9.81 * float(self.model.body_subtreemass[self.stance.hub])
-        return Headway(along=self._along, aside=self._aside, weight=weight)
+        now = self._following
+        return Headway(along=now.along, aside=now.aside, weight=weight)
 
 
 def _period(control_period: float, timestep: float) -> float:

@@ -28,6 +28,12 @@ MOST_ENVS = 1024
 Envs = Annotated[int, partial(whole, at_least=1, at_most=MOST_ENVS)]
 
 
+DEEP = ("sac", "ppo", "td3", "tqc", "crossq")
+"""What learns by gradients, by Stable-Baselines3 and sb3-contrib."""
+ALGORITHMS = (*DEEP, "cma")
+"""What learns: those, and the search over the figures of a gait."""
+
+
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Task(Checked):
     """What Gymnasium has to know of a task before its code is loaded.

@@ -56,6 +56,7 @@ LOWEST = {
     "dm_env": "envs",
     "glfw": "envs",
     "stable_baselines3": "agents",
+    "sb3_contrib": "agents",
     "torch": "agents",
     "cmaes": "agents",
     "onnx": "agents",

@@ -22,8 +22,7 @@ from tca_mj.agents.scripts.tetrapod import GAITS, STEERING, gait_policy
 from tca_mj.agents.train import config as settings
 from tca_mj.agents.train import deep
 from tca_mj.agents.train.config import OffPolicy, OnPolicy, TrainConfig, default_config
-from tca_mj.agents.train.deep import Run, _learner, train
-from tca_mj.agents.train.export import exported
+from tca_mj.agents.train.deep import Run, _learner, exported, train
 from tca_mj.agents.train.learning_env import LearningEnv
 from tca_mj.agents.train.runs import RunFolder
 from tca_mj.agents.train.sb3_env import TaskVecEnv
@@ -40,6 +39,8 @@ LEARNERS = {
     "ppo": OnPolicy(n_steps=10, batch_size=20, n_epochs=2, hidden=(8,)),
     "sac": REMEMBERED,
     "td3": REMEMBERED,
+    "tqc": REMEMBERED,
+    "crossq": REMEMBERED,
 }
 
 
@@ -235,7 +236,7 @@ def test_an_exported_network_acts_as_the_learner_does(algorithm):
     env.obs_rms.mean[:], env.obs_rms.var[:] = 0.3, 2.0
     learner = replace(LEARNERS[algorithm], hidden=(16, 16))
     model = _learner(tiny(algorithm, learner=learner), env)
-    network = exported(model, env)
+    network = exported(model, env, None)
     random = np.random.default_rng(0)
     for _ in range(20):
         seen = random.normal(0.0, 5.0, network.inputs).astype(np.float32)
@@ -251,17 +252,18 @@ def test_the_residual_learner_sees_and_does_what_the_policy_will():
     env.seed(3)
     seen = env.reset()
     observation, _ = single.reset(seed=3)
-    assert seen.shape == (2, 68) and env.observation_space.shape == (68,)
+    n = len(observation)
+    assert seen.shape == (2, n + 2) and env.observation_space.shape == (n + 2,)
     zero = np.zeros((2, 12), dtype=np.float32)
     for _ in range(4):
-        np.testing.assert_array_equal(seen[0, :66], observation)
+        np.testing.assert_array_equal(seen[0, :n], observation)
         angle = 2.0 * np.pi * script.cycle
-        np.testing.assert_allclose(seen[0, 66:], [np.sin(angle), np.cos(angle)], atol=1e-6)
+        np.testing.assert_allclose(seen[0, n:], [np.sin(angle), np.cos(angle)], atol=1e-6)
         observation, *_ = single.step(script.act(observation))
         seen, _, dones, infos = env.step(zero)
     assert dones.all() and env.observation_space.contains(infos[0]["terminal_observation"])
-    np.testing.assert_array_equal(infos[0]["terminal_observation"][:66], observation)
-    np.testing.assert_array_equal(seen[:, 66:], [[0.0, 1.0]] * 2)
+    np.testing.assert_array_equal(infos[0]["terminal_observation"][:n], observation)
+    np.testing.assert_array_equal(seen[:, n:], [[0.0, 1.0]] * 2)
     assert [row["length"] for row in env.finished] == [4.0, 4.0]
     row = env.finished[0]
     assert row["return"] == pytest.approx(sum(v for k, v in row.items() if k[:5] == "term_"),

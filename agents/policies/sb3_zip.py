@@ -89,6 +89,20 @@ class Model:
                 f"{path} is no model of Stable-Baselines3 that can be read: {why(error)}"
             ) from error
 
+    @classmethod
+    @door
+    def parsed(cls, content: bytes, name: str) -> Model:
+        """What a zip says, from its bytes.
+
+        Args:
+            content: The bytes.
+            name: What to note as its name.
+
+        Raises:
+            ValueError: As ``read``.
+        """
+        return _model(content, name)
+
     @door
     def preprocessed(self, units: Floats | None, statistics: Statistics | None) -> Network:
         """The network on observations in the units of the task.

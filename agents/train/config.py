@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from functools import partial
 from typing import Annotated, Any
 
-from tca_mj.checks import Checked, Share, door, number, require_one_of, shown, whole
-from tca_mj.registry import Envs, task_class
-
-ALGORITHMS = ("ppo", "sac", "td3")
+from tca_mj.checks import Checked, Positive, Share, door, number, require_one_of, shown, whole
+from tca_mj.envs.recipe import Recipe
+from tca_mj.registry import DEEP, Envs, task_class
 
 _STEPS = 500_000  # of a run if neither the caller nor the task says: a guess
 
@@ -19,6 +19,15 @@ def _widths(name: str, value: Any) -> tuple[int, ...]:
     if not isinstance(value, tuple | list) or not 1 <= len(value) <= 16:
         raise ValueError(f"{name} must be 1 to 16 widths, got {shown(value)}")
     return tuple(whole(name, width, at_least=1, at_most=10_000) for width in value)
+
+
+def _entropy(name: str, value: Any) -> float | str:
+    if not isinstance(value, str):
+        return number(name, value, at_least=0.0, at_most=10.0)
+    first = value.removeprefix("auto").removeprefix("_") or "1"
+    if not value.startswith("auto") or not re.fullmatch(r"[0-9]{1,3}(\.[0-9]{1,9})?", first):
+        raise ValueError(f"{name} must be a number, 'auto' or 'auto_0.1', got {shown(value)}")
+    return value
 
 
 # No run takes more; what is beyond is a slip.
@@ -65,7 +74,7 @@ class OnPolicy(Checked):
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class OffPolicy(Checked):
-    """Settings of SAC and TD3, under the names of Stable-Baselines3.
+    """Settings of SAC, TD3, TQC and CrossQ, under the names of Stable-Baselines3.
 
     Attributes:
         buffer_size: Steps that are remembered, up to ten million.
@@ -75,8 +84,11 @@ class OffPolicy(Checked):
         batch_size: Of the gradient, up to a million.
         learning_rate: Of Adam, above 0 up to 1 [1].
         gamma: Discount per step, above 0 up to 1 [1].
-        tau: Share by which the target network follows, above 0 up to 1 [1].
-        noise: Standard deviation of TD3's actions, above 0 up to 1 [1]; SAC finds its own.
+        tau: Share by which the target network follows, above 0 up to 1 [1]; CrossQ has none.
+        ent_coef: Weight of the entropy, 0 to 10 [1]; or ``auto``, or ``auto_`` and the weight to
+            begin with. TD3 has none.
+        use_sde: Whether noise depends on what is seen (gSDE); not of TD3.
+        noise: Standard deviation of TD3's actions, above 0 up to 1 [1]; the others find their own.
         hidden: Widths of the up to 16 hidden layers of actor and critics, with ReLU; up to 10 000.
 
     Raises:
@@ -91,6 +103,8 @@ class OffPolicy(Checked):
     learning_rate: Part = 1e-3
     gamma: Part = 0.98
     tau: Part = 0.01
+    ent_coef: Annotated[float | str, _entropy] = "auto"
+    use_sde: bool = False
     noise: Part = 0.1
     hidden: Widths = (64, 64)
 
@@ -101,13 +115,18 @@ class TrainConfig(Checked):
 
     Attributes:
         task: Gymnasium id of a task of this package.
-        algorithm: One of ``ALGORITHMS``.
+        algorithm: One of ``tca_mj.registry.DEEP``.
         learner: The algorithm's settings.
         steps: Steps of all environments together, up to a billion.
         seed: Seed of everything that is drawn, below 2**32.
         envs: Environments that are stepped together, up to 1024.
         options: Options of every reset, in training and in evaluation.
         arguments: What the task is made with: ``action``, ``control_period``.
+        timestep: Physics time step in training; None for the task's own, which evaluations have in
+            any case [s].
+        scaled: Whether observations are scaled by the task's table; otherwise they and the rewards
+            are normalised by running statistics.
+        mirrored: Whether half of each batch of memories is mirrored, left for right.
         residual: Largest correction of a gait's temperatures, which is what is learned then; 0 for
             a policy of its own [K].
         start: The gait that is corrected: ``scripted``, ``trot``, or a policy's file or name.
@@ -128,6 +147,9 @@ class TrainConfig(Checked):
     envs: Envs = 8
     options: Mapping[str, float] = field(default_factory=dict)
     arguments: Mapping[str, Any] = field(default_factory=dict)
+    timestep: Positive | None = None
+    scaled: bool = False
+    mirrored: bool = False
     residual: Annotated[float, partial(number, at_least=0.0, at_most=50.0, unit="K")] = 0.0
     start: str = "scripted"
     interval: Steps = 10_000
@@ -137,10 +159,15 @@ class TrainConfig(Checked):
     def __post_init__(self) -> None:
         Checked.__post_init__(self)
         task = task_class(self.task)
-        require_one_of("algorithm", self.algorithm, ALGORITHMS)
+        require_one_of("algorithm", self.algorithm, DEEP)
         kind = OnPolicy if self.algorithm == "ppo" else OffPolicy
         if not isinstance(self.learner, kind):
             raise ValueError(f"learner must be {kind.__name__}, got {self.learner!r}")
+        if self.mirrored and not (self.scaled and kind is OffPolicy):
+            raise ValueError(
+                f"mirrored must be False without memories of scaled observations, got True for"
+                f" {self.algorithm}"
+            )
         if self.residual and not task.legs:
             raise ValueError(
                 f"residual must be 0 for {self.task}, which has no gait, got {self.residual}"
@@ -153,13 +180,15 @@ class TrainConfig(Checked):
 
 
 @door
-def default_config(task: str, algorithm: str, **change: Any) -> TrainConfig:
-    """The default for a task; tried to the end only where the task says in how many steps.
+def default_config(task: str, algorithm: str | None = None, **change: Any) -> TrainConfig:
+    """The default for a task: its recipe, where it has one for the algorithm.
 
     Args:
         task: Gymnasium id.
-        algorithm: One of ``ALGORITHMS``.
-        change: Fields of ``TrainConfig`` that differ from it.
+        algorithm: One of ``tca_mj.registry.DEEP``; None for the one that is best for the task,
+            as far as that was tried.
+        change: Fields of ``TrainConfig`` that differ from it. ``options`` and ``arguments`` come on
+            top of the recipe's; with another control period the discount per step follows.
 
     Raises:
         ValueError: If a field is out of range or unknown.
@@ -167,11 +196,61 @@ def default_config(task: str, algorithm: str, **change: Any) -> TrainConfig:
     for name in change:
         require_one_of("change", name, [field.name for field in fields(TrainConfig)])
     known = task_class(task)
-    arguments = {"action": "power"} if change.get("residual") else known.learning_arguments
+    algorithm = algorithm or best_algorithm(task)
+    recipe = known.recipes.get(algorithm, Recipe(steps=_STEPS))
+    if change.get("residual"):
+        recipe = Recipe(steps=recipe.steps, action="power", options=recipe.options)
+    asked = {**change.pop("arguments", {})}
+    arguments = {"action": recipe.action} | asked
+    period = asked.get("control_period") or recipe.control_period
+    if period is not None:
+        arguments["control_period"] = period
+    learner = dict(recipe.learner)
+    if recipe.discount is not None:
+        learner["gamma"] = recipe.discount ** (period or known.control_period)
     common: dict[str, Any] = {
-        "learner": OnPolicy() if algorithm == "ppo" else OffPolicy(),
-        "steps": known.learning_steps.get(algorithm, _STEPS),
-        "options": dict(known.learning_options),
-        "arguments": dict(arguments),
+        "learner": (OnPolicy if algorithm == "ppo" else OffPolicy)(**learner),
+        "steps": recipe.steps,
+        "options": {**recipe.options, **change.pop("options", {})},
+        "arguments": arguments,
+        "timestep": recipe.timestep,
+        "scaled": recipe.scaled,
+        "mirrored": recipe.mirrored,
     }
+    if recipe.interval is not None:
+        common["interval"] = recipe.interval
     return TrainConfig(task=task, algorithm=algorithm, **common | change)
+
+
+def best_algorithm(task: str) -> str:
+    """The algorithm that is best for a task, as far as that was tried; errors as ``task_class``."""
+    return next(iter(task_class(task).recipes), DEEP[0])
+
+
+def described(config: TrainConfig) -> str:
+    """What is about to be learned and how, in a line or two.
+
+    Args:
+        config: The settings.
+    """
+    task = task_class(config.task)
+    period = config.arguments.get("control_period") or task.control_period
+    power = config.arguments.get("action") == "power"
+    words = [
+        f"{config.task}: {config.algorithm.upper()}, {config.steps} steps",
+        f"{'power' if power else 'temperatures'} held for {period:g} s",
+        *([f"physics at {1e3 * config.timestep:g} ms"] if config.timestep else []),
+        *(["scaled observations"] if config.scaled else []),
+        *(["mirrored memories"] if config.mirrored else []),
+        *(f"{name} {value}" for name, value in config.options.items()),
+        f"{config.envs} environments", f"seed {config.seed}",
+    ]  # fmt: skip
+    text = ", ".join(words)
+    recipe = task.recipes.get(config.algorithm)
+    if power and period < 0.3 and not config.residual and not (recipe and recipe.action == "power"):
+        text += (
+            f"\nwarning: power that changes every {period:g} s is noise to a TCA, which takes"
+            " seconds: nothing is explored, and half the power, where policies begin, overheats."
+            "\nTemperatures that are held for 0.4 to 1 s are learned"
+        )
+    return text

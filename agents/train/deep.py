@@ -7,6 +7,7 @@ last bit, what it would have done without the interruption.
 
 from __future__ import annotations
 
+import inspect
 import io
 import os
 import pickle
@@ -20,6 +21,7 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 import torch
+from sb3_contrib import TQC, CrossQ
 from stable_baselines3 import PPO, SAC, TD3
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.callbacks import BaseCallback
@@ -28,13 +30,13 @@ from stable_baselines3.common.vec_env import VecNormalize
 
 from tca_mj.agents.episode import RECORDING, VIDEO, Episode
 from tca_mj.agents.output import write_csv
-from tca_mj.agents.policies import SavedPolicy
+from tca_mj.agents.policies import Model, Network, SavedPolicy, Statistics
 from tca_mj.agents.policies.actors import first_gait
 from tca_mj.agents.progress import progress_bar
 from tca_mj.agents.rollout import earned, rollout
 from tca_mj.agents.train.config import TrainConfig
-from tca_mj.agents.train.export import exported
 from tca_mj.agents.train.learning_env import LearningEnv
+from tca_mj.agents.train.mirrored import mirrored_memory
 from tca_mj.agents.train.runs import CURVE, RunFolder, drawn
 from tca_mj.agents.train.sb3_env import TaskVecEnv, silence
 from tca_mj.files import PART, claimed
@@ -45,7 +47,7 @@ BEST, LAST = "best", "last"  # with the ending of their kind
 
 _FILM = 10.0  # length of the film of an episode that takes all its time [s]
 
-_LEARNERS: dict[str, Any] = {"ppo": PPO, "sac": SAC, "td3": TD3}
+_LEARNERS: dict[str, Any] = {"ppo": PPO, "sac": SAC, "td3": TD3, "tqc": TQC, "crossq": CrossQ}
 
 
 def train(
@@ -155,12 +157,17 @@ class Run:
         self.evaluations: list[dict[str, float]] = known["evaluations"]
         self.best: tuple[float, SavedPolicy] | None = known["best"]
         self._gait = first_gait(config.task, config.start) if config.residual else None
+        coarser = {} if config.timestep is None else {"timestep": config.timestep}
         tasks = TaskVecEnv.make(
-            config.task, config.envs, reset_options=dict(config.options), **config.arguments
-        )
+            config.task, config.envs, reset_options=dict(config.options), scaled=config.scaled,
+            **config.arguments, **coarser,
+        )  # fmt: skip
         self.env = LearningEnv(tasks, self._gait, config.residual)
         if state is None:
-            self.normalise = VecNormalize(self.env, gamma=config.learner.gamma)
+            running = not config.scaled
+            self.normalise = VecNormalize(
+                self.env, norm_obs=running, norm_reward=running, gamma=config.learner.gamma
+            )
             self.model = _learner(config, self.normalise)
         else:
             self.env.restore(state["env"])
@@ -175,6 +182,8 @@ class Run:
             _set_generators(self.model, state["generators"])
         silence(self.model)
         self.test_env: gym.Env[Any, Any] = make(config.task, **config.arguments)
+        task: Any = self.test_env.unwrapped
+        self._units = task.observation.units if config.scaled else None
         self.board = folder.tensorboard(self.model.num_timesteps)
         for kind, known_rows in (("training", self.rows), ("evaluation", self.evaluations)):
             if known_rows and known_rows[-1]["steps"] == self.model.num_timesteps:
@@ -208,7 +217,8 @@ class Run:
         self._show("evaluation", row)
         if self.best is None or row["return"] > self.best[0]:
             self.best = row["return"], saved
-            record(config, self.folder.path, saved)
+            for kind in (RECORDING, VIDEO):  # they would show another policy
+                (self.folder.path / kind.replace("rollout", BEST)).unlink(missing_ok=True)
 
     def policy(self) -> SavedPolicy:
         """The policy as it is now."""
@@ -216,10 +226,18 @@ class Run:
         gait, steering = self._gait or (None, ())
         source = f"corrects the gait '{config.start}'" if gait else ""
         return SavedPolicy(
-            task=config.task, network=exported(self.model, self.normalise), gait=gait,
+            task=config.task, network=exported(self.model, self.normalise, self._units), gait=gait,
             steering=steering, bound=config.residual, arguments=config.arguments,
             origin=self.folder.origin(config.algorithm, self.model.num_timesteps, source),
         )  # fmt: skip
+
+    def shown(self) -> dict[str, str]:
+        """How well it learns, in a few words."""
+        row = self.rows[-1]
+        best = self.best[0] if self.best else np.nan
+        found = {"return": f"{row.get('return_mean', np.nan):.2f}", "best": f"{best:.2f}"}
+        speed = row.get("speed_mean")
+        return found if speed is None else {"speed": f"{1e3 * speed:.2f} mm/s", **found}
 
     def save(self) -> None:
         """Replaces the state, then what follows from it."""
@@ -273,9 +291,7 @@ class _Watch(BaseCallback):
         self.bar.update(self.num_timesteps - self.bar.n)
         if self.num_timesteps // self.run.config.interval > self.run.marks:
             self.run.mark()
-            now = self.run.rows[-1].get("return_mean", np.nan)
-            best = self.run.best[0] if self.run.best else np.nan
-            self.bar.set_postfix({"return": f"{now:.2f}", "best": f"{best:.2f}"})
+            self.bar.set_postfix(self.run.shown())
 
     def _on_step(self) -> bool:
         return True
@@ -283,18 +299,42 @@ class _Watch(BaseCallback):
 
 def _learner(config: TrainConfig, env: VecNormalize) -> BaseAlgorithm:
     """A new model."""
-    settings = asdict(config.learner)
-    network: dict[str, Any] = {"net_arch": list(settings.pop("hidden"))}
+    kind, settings = _LEARNERS[config.algorithm], asdict(config.learner)
+    network: dict[str, Any] = {"net_arch": list(settings["hidden"])}
     if "log_std_init" in settings:
-        network["log_std_init"] = settings.pop("log_std_init")
-    noise = settings.pop("noise", None)
-    if config.algorithm == "td3":
+        network["log_std_init"] = settings["log_std_init"]
+    if kind is TD3:
         n = env.action_space.shape or (1,)
-        settings["action_noise"] = NormalActionNoise(np.zeros(n), np.full(n, noise))
-    model: BaseAlgorithm = _LEARNERS[config.algorithm](
-        "MlpPolicy", env, seed=config.seed, device="cpu", policy_kwargs=network, **settings
-    )
+        settings["action_noise"] = NormalActionNoise(np.zeros(n), np.full(n, settings["noise"]))
+    if config.mirrored:
+        assert isinstance(env.unwrapped, TaskVecEnv)
+        settings |= mirrored_memory(env.unwrapped)
+    known = inspect.signature(kind).parameters
+    model: BaseAlgorithm = kind(
+        "MlpPolicy", env, seed=config.seed, device="cpu", policy_kwargs=network,
+        **{name: value for name, value in settings.items() if name in known},
+    )  # fmt: skip
     return model
+
+
+def exported(model: BaseAlgorithm, normalise: VecNormalize, units: Any) -> Network:
+    """What a model does without noise, as plain numbers.
+
+    Args:
+        model: The model.
+        normalise: What normalises its observations, or does not.
+        units: Centre and scale by which they are taken first; None for as they are.
+    """
+    statistics = None
+    if normalise.norm_obs:
+        seen: Any = normalise.obs_rms
+        statistics = Statistics(
+            mean=tuple(seen.mean.tolist()), var=tuple(seen.var.tolist()),
+            clip=float(normalise.clip_obs), epsilon=float(normalise.epsilon),
+        )  # fmt: skip
+    buffer = io.BytesIO()
+    model.save(buffer)
+    return Model.parsed(buffer.getvalue(), "").preprocessed(units, statistics)
 
 
 def _generators(model: BaseAlgorithm) -> dict[str, Any]:

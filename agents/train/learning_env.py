@@ -29,7 +29,7 @@ class LearningEnv(VecEnvWrapper):
 
     Attributes:
         finished: For every episode that ended since it was last emptied: ``return``, ``length``,
-            ``success``, ``early_end`` and each reward term.
+            ``success``, ``early_end``, each reward term, and ``speed`` [m/s] where there is one.
     """
 
     venv: TaskVecEnv
@@ -83,6 +83,8 @@ class LearningEnv(VecEnvWrapper):
             over = "truncation_reason" in info or not info["TimeLimit.truncated"]
             ends = {"success": float(info["success"]),
                     "early_end": float(over and not info["success"])}  # fmt: skip
+            if "speed" in info:
+                ends["speed"] = float(info["speed"])
             self.finished.append(dict(sums | ends))
             self._sums[i] = defaultdict(float)
             if self._walkers:

@@ -39,6 +39,7 @@ class TaskVecEnv(VecEnv):
 
     Attributes:
         tasks: The vector environment.
+        scaled: Whether observations are scaled.
     """
 
     def __init__(self, tasks: TaskVector, *, scaled: bool = False) -> None:
@@ -48,7 +49,7 @@ class TaskVecEnv(VecEnv):
             tasks: The vector environment.
             scaled: Whether observations come as ``ScaledObservation`` makes them.
         """
-        self.tasks = tasks
+        self.tasks, self.scaled = tasks, scaled
         table = tasks.envs[0].observation
         self._seen = table.scaled if scaled else np.asarray
         self._actions = np.zeros(tasks.action_space.shape or (), dtype=np.float32)

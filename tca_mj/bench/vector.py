@@ -70,7 +70,7 @@ def benchmark(
         "tasks": {}, "training": {}, "left_out": {},
     }  # fmt: skip
     chosen = list(ids) or [task.id for task in TASKS]
-    trained = next((id for id in chosen if task_class(id).learning_steps), chosen[0])
+    trained = next((id for id in chosen if task_class(id).recipes), chosen[0])
     with progress_bar(len(chosen) + 1, unit="tasks", leave=False) as bar:
         for id in [*chosen, _PEER]:
             with _if_installed(id, result):

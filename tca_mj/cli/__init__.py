@@ -11,9 +11,10 @@ from typing import Any
 
 import tca_mj
 from tca_mj.cli import check, learn, play
-from tca_mj.cli.arguments import ALGORITHMS, POLICIES, filled
+from tca_mj.cli.arguments import POLICIES, filled
 from tca_mj.cli.play import outcome, speed_table
 from tca_mj.cli.signals import Signals
+from tca_mj.registry import ALGORITHMS
 
 __all__ = ["ALGORITHMS", "POLICIES", "main", "outcome", "speed_table"]
 

@@ -17,7 +17,6 @@ from tca_mj.checks import LARGEST
 from tca_mj.registry import DEMOS, TASKS, find_task
 
 POLICIES = ("scripted", "off", "random")  # who acts besides saved policies
-ALGORITHMS = ("cma", "ppo", "sac", "td3")  # what ``tca-mj train`` learns by
 
 Commands: TypeAlias = "argparse._SubParsersAction[argparse.ArgumentParser]"
 

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 from tca_mj.cli.arguments import (
-    ALGORITHMS,
     Commands,
     add,
     add_command,
@@ -15,9 +14,11 @@ from tca_mj.cli.arguments import (
     how_trained,
     parse_axis,
     parse_number,
+    parse_option,
     parse_seconds,
     task_name,
 )
+from tca_mj.registry import ALGORITHMS
 
 
 def add_commands(commands: Commands) -> None:
@@ -40,14 +41,20 @@ def add_commands(commands: Commands) -> None:
 
     train = add_command(commands, "train", _train, help="train a policy", extra="rl")
     add(train, "task", "its id")
-    add(train, "--algo", "how", choices=ALGORITHMS, required=True)
+    add(train, "--algo", "how; default: what was best for the task", choices=ALGORITHMS)
     add(train, "--steps", "steps of the task in all; default: by task")
+    add(train, "--option", "an option of every reset; may be given several times", action="append",
+        default=[], type=parse_option, metavar="NAME=VALUE", dest="options")  # fmt: skip
+    add(train, "--action", "what the TCAs are told; default: by task",
+        choices=("temperature", "power"))  # fmt: skip
+    add(train, "--control-period", "time of a step [s]; default: by task", type=parse_seconds,
+        metavar="SECONDS")  # fmt: skip
     some = train.add_mutually_exclusive_group()
     add(some, "--seed", "default 0")
     add(some, "--seeds", "runs with seeds 0 to K-1, into OUT/seed_0, ...", metavar="K")
     add(train, "--out", "folder; default runs/train/TASK-ALGO")
     add(train, "--workers", "processes of cma; default 2", default=2)
-    add(train, "--envs", "environments of ppo, sac, td3 at a time")
+    add(train, "--envs", "environments at a time; not of cma")
     add(train, "--residual", "correct a gait by at most K kelvin", type=parse_number, metavar="K")
     add(train, "--video", "film the best network at the end; --no-video leaves that for later",
         action=argparse.BooleanOptionalAction, default=True)  # fmt: skip
@@ -109,13 +116,14 @@ def _train(arguments: argparse.Namespace) -> int:
     from --seed alone; with the same seed the curve is the same to the last digit, interrupted or
     not.
 
+      sac, ppo, td3, tqc, crossq
+             deep reinforcement learning by Stable-Baselines3, for every task. Without --algo, and
+             without other settings, a task is learned by its recipe: what was best of what was
+             tried (docs/training.md). With --residual K the policy of a gait task corrects the
+             temperatures of the gait --start by at most K kelvin.
       cma    searches the figures of a gait on four legs (CMA-ES), from the scripted one, in about
              10 minutes on two cores. Episodes run in --workers processes, on whose number nothing
              depends.
-      ppo, sac, td3
-             deep reinforcement learning by Stable-Baselines3, for every task. The defaults of each
-             task are in tca_mj.agents.train.config. With --residual K the policy of a gait task
-             corrects the temperatures of the gait --start by at most K kelvin.
 
     The folder holds
       run.json        settings, command, versions, machine
@@ -130,17 +138,23 @@ def _train(arguments: argparse.Namespace) -> int:
     130 after Ctrl-C.
 
     examples:
-      tca-mj train {task} --algo sac --seed 0 --out runs/learned
+      tca-mj train {task} --out runs/learned
+      tca-mj train TASK --option NAME=VALUE --steps 40000 --seeds 5 --out runs/five
       tca-mj train TASK --algo cma --start trot --seeds 3 --out runs/trot
       tca-mj train TASK --algo ppo --residual 20 --steps 300000 --out runs/corrected
     """
     import tca_mj.agents.train.deep as training
     import tca_mj.agents.train.search as searching
-    from tca_mj.agents.train.config import default_config
+    from tca_mj.agents.train.config import best_algorithm, default_config, described
 
-    base = arguments.out or Path("runs/train") / f"{task_name(arguments.task)}-{arguments.algo}"
+    algorithm = arguments.algo or best_algorithm(arguments.task)
+    base = arguments.out or Path("runs/train") / f"{task_name(arguments.task)}-{algorithm}"
     several = range(arguments.seeds) if arguments.seeds else None
-    command, cma = _command(arguments), arguments.algo == "cma"
+    command, cma = _command(arguments), algorithm == "cma"
+    how = ("action", "control_period")
+    asked = {name: getattr(arguments, name) for name in how if getattr(arguments, name) is not None}
+    if cma and (asked or arguments.options):
+        raise ValueError("--action, --control-period and --option are not for --algo cma")
     for seed in several or [arguments.seed]:
         out = base / f"seed_{seed}" if several else base
         arguments.kept[:] = [f"the same command goes on with {out}"]
@@ -152,7 +166,9 @@ def _train(arguments: argparse.Namespace) -> int:
             config = searching.SearchConfig(task=arguments.task, **given)
             searching.search(config, out, workers=arguments.workers, command=command)
         else:
-            settings = default_config(arguments.task, arguments.algo, **given)
+            given |= {"arguments": asked, "options": dict(arguments.options)}
+            settings = default_config(arguments.task, algorithm, **given)
+            print(described(settings), file=sys.stderr)
             training.train(settings, out, command=command, video=False)
             if arguments.video:
                 arguments.kept[:] = [f"{out} is finished but for its film, which the same command"
@@ -166,11 +182,16 @@ def _train(arguments: argparse.Namespace) -> int:
 
 def _command(arguments: argparse.Namespace) -> str:
     """The command of a training run, to be noted."""
-    words = ["tca-mj", "train", arguments.task, "--algo", arguments.algo]
-    for option in ("steps", "envs", "residual", "start", "seeds", "seed"):
+    words = ["tca-mj", "train", arguments.task]
+    left_out = {"seed": bool(arguments.seeds), "start": arguments.start == "scripted"}
+    for option in ("algo", "steps", "action", "control_period", "envs", "residual", "start",
+                   "seeds", "seed"):  # fmt: skip
         value = getattr(arguments, option)
-        if value is not None and not (option == "seed" and arguments.seeds):
-            words += [f"--{option}", f"{value:g}" if isinstance(value, float) else str(value)]
+        if value is not None and not left_out.get(option):
+            number = f"{value:g}" if isinstance(value, float) else str(value)
+            words += [f"--{option.replace('_', '-')}", number]
+    for name, value in arguments.options:
+        words += ["--option", f"{name}={value}"]
     return shlex.join(words)
 
 
