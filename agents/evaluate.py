@@ -25,7 +25,7 @@ import tca_mj  # noqa: F401  (registers the tasks in a new process)
 from tca_mj.agents.design import robot_of
 from tca_mj.agents.finished import EPISODES, begun, keep
 from tca_mj.agents.policies import Policy, Preprocessing
-from tca_mj.agents.policies.actors import NAMES, actor, arguments_of
+from tca_mj.agents.policies.actors import NAMES, actor, arguments_of, called
 from tca_mj.agents.policies.load import find
 from tca_mj.agents.progress import progress_bar
 from tca_mj.agents.rollout import rollout
@@ -47,6 +47,7 @@ METRICS = {
     "speed": ("mm/s", 1e3, 2),
     "distance": ("mm", 1e3, 1),
     "drift": ("mm", 1e3, 1),
+    "heading_error": ("°", 180.0 / np.pi, 1),
     "energy": ("J", 1.0, 1),
     "energy_per_metre": ("kJ/m", 1e-3, 2),
     "cost_of_transport": ("", 1.0, 0),
@@ -78,6 +79,7 @@ class Evaluation(Checked):
         arguments: What the task is made with, on top of what the policy's file says: ``action``,
             ``control_period``.
         preprocessing: What became of the observations of a model of Stable-Baselines3.
+        options: Options of every reset besides ``randomise``.
 
     Raises:
         ValueError: If something is unknown or out of range.
@@ -94,6 +96,7 @@ class Evaluation(Checked):
     design: Mapping[str, Any] = field(default_factory=dict)
     arguments: Mapping[str, Any] = field(default_factory=dict)
     preprocessing: Preprocessing = Preprocessing()
+    options: Mapping[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         Checked.__post_init__(self)
@@ -104,21 +107,22 @@ class Evaluation(Checked):
             robot_of(self.task, self.design)
 
     @property
-    def options(self) -> dict[str, float]:
+    def begins_with(self) -> dict[str, Any]:
         """Options of the reset."""
-        return {"randomise": self.randomise} if self.randomise else {}
+        return {**({"randomise": self.randomise} if self.randomise else {}), **self.options}
 
     def key(self) -> str:
         """Tells apart what must not be mixed: settings, the policy's contents, versions."""
         settings = asdict(self)
         del settings["episodes"], settings["seed"]
         for name, usual in (
-            ("design", {}), ("arguments", {}), ("preprocessing", Preprocessing()),
+            ("design", {}), ("arguments", {}), ("preprocessing", Preprocessing()), ("options", {}),
         ):  # fmt: skip
             if getattr(self, name) == usual:
                 del settings[name]
         if self.policy not in NAMES:
-            settings["policy"] = hashlib.sha256(find(self.policy).read_bytes()).hexdigest()
+            content = b"" if called(self.policy) else find(self.policy).read_bytes()
+            settings["policy"] = self.policy if not content else hashlib.sha256(content).hexdigest()
         text = json.dumps([settings, versions()], sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()[:16]
 
@@ -141,7 +145,10 @@ class Evaluation(Checked):
     @door
     def actor(self, env: gym.Env[Any, Any], seed: Seed) -> Policy:
         """Who acts in an environment; errors as ``tca_mj.agents.policies.actors.actor``."""
-        return actor(self.policy, env, seed=seed, preprocessing=self.preprocessing)
+        other = bool(self.design) or self.model != "used"
+        return actor(
+            self.policy, env, seed=seed, preprocessing=self.preprocessing, other_robot=other
+        )
 
 
 @door
@@ -155,7 +162,8 @@ def run_episode(evaluation: Evaluation, seed: Seed) -> dict[str, Any]:
     Returns:
         ``seed``, ``steps``, ``ending``, and the figures of ``METRICS``: ``return``; ``success``
         (what the task calls so; of a gait, whether it came to the end of its time); ``duration``
-        [s]; ``speed`` [m/s], ``distance`` and ``drift`` (its size) [m] where the robot gets on;
+        [s]; ``speed`` [m/s], ``distance`` and ``drift`` (its size) [m] where the robot gets on, and
+        the largest ``heading_error`` (its size) [rad] where it has one;
         ``energy`` of TCAs and heaters [J]; ``weight`` [N] there; ``peak_temperature`` [°C] and
         ``peak_tension`` [N] of the TCAs.
     """
@@ -163,13 +171,14 @@ def run_episode(evaluation: Evaluation, seed: Seed) -> dict[str, Any]:
     try:
         policy = evaluation.actor(env, seed)
         task: Any = env.unwrapped
-        episode = rollout(env, policy, seed=seed, options=evaluation.options)
+        episode = rollout(env, policy, seed=seed, options=evaluation.begins_with)
         step, start = next(episode), task.headway()
-        total, hottest, tightest, steps = 0.0, -np.inf, 0.0, 0
+        total, hottest, tightest, steps, astray = 0.0, -np.inf, 0.0, 0, 0.0
         for step in episode:
             total, steps = total + step.reward, steps + 1
             hottest = max(hottest, float(task.sim.temperature.max()))
             tightest = max(tightest, float(task.sim.tension.max()))
+            astray = max(astray, abs(step.info.get("heading_error", 0.0)))
         row = {
             "seed": seed,
             "steps": steps,
@@ -190,6 +199,8 @@ def run_episode(evaluation: Evaluation, seed: Seed) -> dict[str, Any]:
                 "speed": along / task.sim.time,
                 "weight": end.weight,
             }
+        if "heading_error" in step.info:
+            row["heading_error"] = astray
         return row
     finally:
         env.close()

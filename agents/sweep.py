@@ -102,7 +102,7 @@ class Trial:
     def evaluation(self, folder: Path) -> Evaluation:
         """What is measured; the policy is that of the run in ``folder`` if one is trained."""
         known = {entry.name for entry in fields(Evaluation)} - {
-            "task", "design", "arguments", "preprocessing",
+            "task", "design", "arguments", "preprocessing", "options",
         }  # fmt: skip
         design = dict(self.sweep.evaluation.design)
         change: dict[str, Any] = {}

@@ -1,9 +1,11 @@
 from tca_mj.envs.arm import ArmPickPlace, ArmPickPlaceVector
+from tca_mj.envs.command import Command, Following
 from tca_mj.envs.course import Places, TetrapodCourse, TetrapodCourseVector
 from tca_mj.envs.hanging import NoRest, StaticTip, hang
 from tca_mj.envs.morph import MorphModule, MorphModuleVector, hanging_module
 from tca_mj.envs.options import Constant, Option, Options, Uniform, variation_options
 from tca_mj.envs.reach import BendReach, BendReachVector
+from tca_mj.envs.recipe import Recipe
 from tca_mj.envs.table import Entry, Table
 from tca_mj.envs.task import HEATINGS, Headway, SimulatedTask, TaskArguments, TaskState, Verdict
 from tca_mj.envs.tetrapod import GaitTask, TetrapodGait, TetrapodGaitVector
@@ -12,11 +14,11 @@ from tca_mj.envs.viewer import NoDisplay, ViewerEnvironment, ViewerPolicy, launc
 from tca_mj.envs.wrappers import RecordRerun, ScaledObservation, VectorScaledObservation
 
 __all__ = [
-    "ArmPickPlace", "ArmPickPlaceVector", "BendReach", "BendReachVector", "Constant", "Entry",
-    "GaitTask", "HEATINGS", "Headway", "MorphModule", "MorphModuleVector", "NoDisplay", "NoRest",
-    "Option", "Options", "Places", "RecordRerun", "ScaledObservation", "SimulatedTask", "StaticTip",
-    "Table", "TaskArguments", "TaskState", "TaskVector", "TetrapodCourse", "TetrapodCourseVector",
-    "TetrapodGait", "TetrapodGaitVector", "Uniform", "VectorScaledObservation", "Verdict",
-    "ViewerEnvironment", "ViewerPolicy", "hang", "hanging_module", "launch", "need_display",
-    "register_task", "variation_options",
+    "ArmPickPlace", "ArmPickPlaceVector", "BendReach", "BendReachVector", "Command", "Constant",
+    "Entry", "Following", "GaitTask", "HEATINGS", "Headway", "MorphModule", "MorphModuleVector",
+    "NoDisplay", "NoRest", "Option", "Options", "Places", "Recipe", "RecordRerun",
+    "ScaledObservation", "SimulatedTask", "StaticTip", "Table", "TaskArguments", "TaskState",
+    "TaskVector", "TetrapodCourse", "TetrapodCourseVector", "TetrapodGait", "TetrapodGaitVector",
+    "Uniform", "VectorScaledObservation", "Verdict", "ViewerEnvironment", "ViewerPolicy", "hang",
+    "hanging_module", "launch", "need_display", "register_task", "variation_options",
 ]  # fmt: skip

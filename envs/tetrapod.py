@@ -1,4 +1,5 @@
-"""``TCA/TetrapodCrawl-v0``, ``Walk`` and ``Shimmy``: a robot of one shape gets on (Sun, 6.3.2)."""
+"""``TCA/TetrapodCrawl-v0``, ``Walk`` and ``Shimmy``: a robot of one shape follows commands, as
+fast as it can where nothing else is said (Sun, 6.3.2)."""
 
 from __future__ import annotations
 
@@ -111,7 +112,7 @@ def _fine_body(spec: TetrapodSpec) -> dict[str, Any]:
 
 
 class TetrapodGait(SimulatedTask):
-    """Get on in a commanded direction, cold and rigid in one shape, by the legs alone.
+    """Get on as commanded, cold and rigid in one shape, by the legs alone.
 
     The morphing tetrapod crawls flat, walks with its body bent to a right angle, or shimmies along
     a beam that its U-shaped body and its legs embrace. It senses its TCAs, its own motion and
@@ -122,17 +123,25 @@ class TetrapodGait(SimulatedTask):
     rear left and rear right; see ``SimulatedTask``. Left and right are mirror images, which the
     tables say.
 
-    Observation, shape (66,): see ``OBSERVATION``, whose rows have units and bounds. Orientation is
+    A command is a heading that may turn, a direction of travel to the left of it, and a speed. It
+    comes with ``reset``, with ``order`` at any time, or, with the option ``wander``, is drawn anew
+    every 8 to 20 s. Without any, the robot is to go along x as fast as it can.
+
+    Observation, shape (71,): see ``OBSERVATION``, whose rows have units and bounds. Orientation is
     that of the hub, the middle of the spines, in the world, with a first number that is not
     negative; height is the hub's above what the robot stands on. Velocities, feet (x, y, z of each
     leg's) and the commanded direction (x and y of a unit vector) are in the hub's frame: x forward,
-    y left, z up.
+    y left, z up. What is seen of how the command is followed is explained at ``Following``.
 
-    Reward, the sum of the terms in ``info["reward_terms"]``. The first two pay for progress and
+    Reward, the sum of the terms in ``info["reward_terms"]``. The first four pay for a change and
     take it back, so that nothing is earned by shaking:
         progress: Distance gained along the commanded direction over the published speed [s].
-        drift: Minus half of what is gained in distance from the line of that direction through the
-            start, over the published speed.
+        drift: Minus half of what is gained in distance from the line of that direction through
+            where it was commanded, over the published speed.
+        lead: Minus twice what is gained in distance ahead of the commanded speed, over the
+            published speed: faster than commanded is as bad as slower.
+        turn: Minus what the robot gets away from the commanded heading, 0.1 m for a radian, over
+            the published speed.
         posture: Minus 0.2 (1 - cosine of the tilt), every 0.1 s.
         energy: Minus 0.002 per joule of electrical energy.
         heat: Minus 0.002 for every kelvin by which a TCA is above ``hot_temperature``, every 0.1 s.
@@ -140,7 +149,8 @@ class TetrapodGait(SimulatedTask):
 
     Reset: the robot is put down at the origin and comes to rest, for 0.5 s that are not counted.
     Where it looks and how far its body is bent is drawn; ``options`` is the table of all that can
-    be given.
+    be given: commands, a slope, pushes, and by how much the robot is off. On a slope it is gravity
+    that is tilted, so that the world's z stays that of the ground.
 
     Terminates with ``info["termination_reason"]`` when the robot has fallen over or off the beam.
     Truncates after the time limit, and with ``info["truncation_reason"]`` if a TCA is too hot or
@@ -151,7 +161,7 @@ class TetrapodGait(SimulatedTask):
         >>> env = TetrapodGait(gait="crawl")
         >>> observation, info = env.reset(seed=0)
         >>> observation.shape, env.action_space.shape
-        ((66,), (12,))
+        ((71,), (12,))
     """
 
     # Of each TCA of a leg [W]. Estimate: through its cold 3.7 ohm about 1 A, the most that is
@@ -321,6 +331,11 @@ class TetrapodGait(SimulatedTask):
         self._following = self._following.told(Command(**kept))
         if heading is not None:
             self._following = self._following._replace(heading=number("heading", heading))
+
+    @property
+    def following(self) -> Following:
+        """What the robot is told, and how it has followed that."""
+        return self._following
 
     def _draw_command(self) -> None:
         task = self.task

@@ -43,14 +43,12 @@ class Task(Checked):
         entry_point: ``module:class`` of the environment.
         max_episode_steps: Number of control steps after which ``TimeLimit`` truncates.
         kwargs: Arguments of the class that make it this task; a caller's own come on top.
-        demo: Name of the demo that its scripted policy is; empty for none.
     """
 
     id: str
     entry_point: str
     max_episode_steps: EpisodeSteps
     kwargs: Mapping[str, Any] = field(default_factory=dict)
-    demo: str = ""
 
     @property
     def vector_entry_point(self) -> str:
@@ -64,7 +62,6 @@ TASKS = (
         id="TCA/ArmPickPlace-v0",
         entry_point="tca_mj.envs.arm:ArmPickPlace",
         max_episode_steps=1000,
-        demo="pick-and-place",
     ),
     Task(
         id="TCA/MorphModule-v0",
@@ -89,7 +86,6 @@ TASKS = (
         id="TCA/TetrapodCourse-v0",
         entry_point="tca_mj.envs.course:TetrapodCourse",
         max_episode_steps=15000,
-        demo="tetrapod",
     ),
 )
 
@@ -107,7 +103,39 @@ def register() -> None:
             )
 
 
-DEMOS = {task.demo: task.id for task in TASKS if task.demo}
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Demo(Checked):
+    """An episode worth seeing.
+
+    Attributes:
+        name: What one types.
+        task: Gymnasium id.
+        policy: Who acts, as ``tca_mj.agents.policies.actors.actor`` knows it.
+        arguments: What the task is made with besides what the policy needs.
+    """
+
+    name: str
+    task: str
+    policy: str = "scripted"
+    arguments: Mapping[str, Any] = field(default_factory=dict)
+
+
+_GUIDED = "tca_mj.agents.scripts.guided"
+_SHOWN = (
+    Demo(name="pick-and-place", task="TCA/ArmPickPlace-v0"),
+    Demo(name="tetrapod", task="TCA/TetrapodCourse-v0"),
+    *(
+        Demo(
+            name=way,
+            task="TCA/TetrapodWalk-v0",
+            policy=f"{_GUIDED}:{way}",
+            arguments={"max_episode_steps": 500},
+        )
+        for way in ("square", "waypoints")
+    ),
+)
+DEMOS = {demo.name: demo for demo in _SHOWN}
+"""What ``tca-mj demo`` shows, by name."""
 
 
 @door

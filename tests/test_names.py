@@ -25,7 +25,7 @@ INTERNAL = {
     "tca_mj": {
         "actuation": "muscle_group", "bench": "*", "checks": "*", "couple": "*", "files": "*",
         "forks": "*", "hints": "*", "lazy": "*", "machine": "*", "pages": "*", "quadrature": "*",
-        "routes": "require_route", "testing": "*",
+        "registry": "Demo", "routes": "require_route", "testing": "*",
     },
     "tca_mj.smp": {"damage": "damaging", "fixing": "with_glass", "heater": "heated"},
     "tca_mj.tca": {
@@ -46,22 +46,25 @@ INTERNAL = {
     "tca_mj.certify": {"": "*"},
     "tca_mj.validation": {"": "*"},
     "tca_mj.envs": {
-        "options": "variation_of", "rewards": "*", "stance": "*", "table": "commands",
+        "command": "command_options commanded drawn", "options": "variation_of", "rewards": "*",
+        "stance": "*", "table": "commands",
         "task": "broken_off how_it_ended parts together",
     },
     "tca_mj.agents": {
         "cluster": "*", "evaluate": "endings report", "finished": "begun keep",
         "output": "*", "progress": "*", "workers": "*",
     },
-    "tca_mj.agents.policies": {"archives": "*", "load": "require_untold", "onnx": "*"},
+    "tca_mj.agents.policies": {
+        "actors": "called", "archives": "*", "load": "require_untold", "onnx": "*",
+    },
     "tca_mj.agents.scripts": {
         # one for each task, found by the task's ``scripted``
         "arm": "scripted", "morph": "calibrate scripted",
         "reach": "scripted", "tetrapod": "scripted",
     },
     "tca_mj.agents.train": {
-        "deep": "Run film record", "export": "*", "gait_score": "*", "learning_env": "*",
-        "runs": "*", "sb3_env": "silence",
+        "config": "best_algorithm described", "deep": "Run exported film record",
+        "gait_score": "*", "learning_env": "*", "runs": "*", "sb3_env": "silence",
     },
 }  # fmt: skip
 # Packages that are an arrangement of files: what they have for users, the package above offers.

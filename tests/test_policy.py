@@ -144,7 +144,7 @@ def test_wrong_files_are_refused_by_name(env, tmp_path):
         with pytest.raises(ValueError, match="is no policy"):
             load_policy(bad, env)
     small = SavedPolicy(task=WALKING, origin=ORIGIN, network=network(5))
-    with pytest.raises(ValueError, match="must turn 66 numbers into 12, got .* from 5 to 12"):
+    with pytest.raises(ValueError, match="must turn 71 numbers into 12, got .* from 5 to 12"):
         load_policy(small.save(tmp_path / "small.npz"), env)
     with pytest.raises(ValueError, match=r"path must end in \.npz for a network"):
         small.save(tmp_path / "small.json")

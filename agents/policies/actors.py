@@ -62,25 +62,32 @@ class Script:
 @door
 def actor(
     name: str | Path, env: gym.Env[Any, Any], *, seed: Seed = 0,
-    preprocessing: Preprocessing | None = None,
+    preprocessing: Preprocessing | None = None, other_robot: bool = False,
 ) -> Policy:
     """Who acts in an environment.
 
     Args:
         name: One of ``NAMES``, the name of a shipped policy, a policy's file, a model of
             Stable-Baselines3 (``.zip``), or the folder of a training run, whose best policy is
-            taken.
+            taken; or ``module:callable`` of what makes a policy from the environment, which is
+            imported. If that has ``arguments``, the task is made with them.
         env: The Gymnasium environment.
         seed: Seed of what is random.
         preprocessing: What became of the observations of a model of Stable-Baselines3, see
             ``tca_mj.agents.policies.load.read_zip``.
+        other_robot: Whether a policy may act on another robot than the one it was made for.
 
     Raises:
         FileNotFoundError: If there is no such policy.
         ValueError: If it is one for another task, or the task has no script.
     """
+    maker = called(name)
+    if maker is not None:
+        require_untold(name, preprocessing)
+        made: Policy = maker(env)
+        return made
     if str(name) not in NAMES:
-        return load_policy(name, env, preprocessing)
+        return load_policy(name, env, preprocessing, other_robot=other_robot)
     require_untold(name, preprocessing)
     if name == "scripted":
         return scripted(env)
@@ -101,8 +108,27 @@ def arguments_of(name: str | Path, task: str) -> dict[str, Any]:
     """
     if name == "scripted":
         return dict(task_class(task).scripted_arguments)
+    maker = called(name)
+    if maker is not None:
+        return dict(getattr(maker, "arguments", {}))
     path = None if str(name) in NAMES else find(name)
     return {} if path is None or path.suffix == ZIP else dict(SavedPolicy.read(path).arguments)
+
+
+def called(name: str | Path) -> Callable[[Any], Policy] | None:
+    """What ``module:callable`` names; None for anything else.
+
+    Raises:
+        ValueError: If there is no such module or callable.
+    """
+    module, colon, attribute = str(name).rpartition(":")
+    if not colon or Path(name).exists() or not module.replace(".", "_").isidentifier():
+        return None
+    try:
+        found: Callable[[Any], Policy] = getattr(import_module(module), attribute)
+    except (ImportError, AttributeError) as error:
+        raise ValueError(f"name must be module:callable, got {name}: {error}") from error
+    return found
 
 
 @door

@@ -28,6 +28,7 @@ from numpy.typing import NDArray
 
 from tca_mj.agents.output import write_json
 from tca_mj.agents.policies.archives import LONGEST, arrays, content_of, why
+from tca_mj.agents.policies.contracts import digest
 from tca_mj.agents.policies.gait import GaitPolicy
 from tca_mj.agents.policies.network import Network
 from tca_mj.agents.policies.onnx import onnx_model
@@ -91,6 +92,10 @@ class SavedPolicy(Checked):
         network: The network, of the kinds ``network`` and ``residual``.
         bound: Largest correction of a temperature, of the kind ``residual`` [K].
         arguments: What the task was made with: ``action``, ``control_period``.
+        made_for: The contract of the task that it was made in, see ``contract``; empty if that is
+            not known, and then nothing but sizes is compared.
+        evaluation: How good it was: settings, and figures with their intervals; empty if it was
+            not measured.
 
     Raises:
         ValueError: If there is neither gait nor network, or the bound is missing or negative.
@@ -103,6 +108,8 @@ class SavedPolicy(Checked):
     network: Network | None = None
     bound: NotNegative = 0.0
     arguments: Mapping[str, Any] = field(default_factory=lambda: {"action": "power"})
+    made_for: Mapping[str, Any] = field(default_factory=dict)
+    evaluation: Mapping[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         Checked.__post_init__(self)
@@ -138,6 +145,10 @@ class SavedPolicy(Checked):
             "format": FORMAT, "kind": self.kind, "task": self.task, "origin": asdict(self.origin),
             "arguments": dict(self.arguments),
         }  # fmt: skip
+        if self.made_for:
+            header |= {"made_for": dict(self.made_for), "contract": digest(self.made_for)}
+        if self.evaluation:
+            header["evaluation"] = dict(self.evaluation)
         if self.gait is not None:
             header |= {"gait": asdict(self.gait), "steering": self.steering}
         if self.network is None:
@@ -209,6 +220,8 @@ class SavedPolicy(Checked):
                 network=_network(header, found) if header["kind"] != "gait" else None,
                 bound=header.get("bound", 0.0),
                 arguments=header.get("arguments", {"action": "power"}),
+                made_for=_parts(header.get("made_for", {})),
+                evaluation=header.get("evaluation", {}),
             )
         except FileNotFoundError:
             raise
@@ -281,6 +294,12 @@ def with_clock(observation: NDArray[np.float32], walker: GaitPolicy) -> NDArray[
     """
     angle = 2.0 * np.pi * walker.cycle
     return np.append(observation, np.array([np.sin(angle), np.cos(angle)], dtype=np.float32))
+
+
+def _parts(made_for: Any) -> dict[str, Any]:
+    if not isinstance(made_for, dict) or not all(isinstance(p, dict) for p in made_for.values()):
+        raise ValueError(f"made_for must be the parts of a contract, got {shown(made_for)}")
+    return made_for
 
 
 def _gait(row: Mapping[str, Any]) -> Gait:

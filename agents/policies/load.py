@@ -11,6 +11,7 @@ from typing import Any, cast
 import gymnasium as gym
 import numpy as np
 
+from tca_mj.agents.policies.contracts import ROBOT, contract, differences
 from tca_mj.agents.policies.files import KINDS, Policy, SavedPolicy
 from tca_mj.agents.policies.network import Network
 from tca_mj.agents.policies.preprocessing import Preprocessing
@@ -26,7 +27,11 @@ BEST = ("best.json", "best.npz", "best_model.zip")  # the last by its EvalCallba
 
 @door
 def load_policy(
-    source: str | Path, env: gym.Env[Any, Any], preprocessing: Preprocessing | None = None
+    source: str | Path,
+    env: gym.Env[Any, Any],
+    preprocessing: Preprocessing | None = None,
+    *,
+    other_robot: bool = False,
 ) -> Policy:
     """A policy from a file, ready to act in an environment.
 
@@ -34,10 +39,12 @@ def load_policy(
         source: As for ``find``. A ``.zip`` is a model of Stable-Baselines3, see ``read_zip``.
         env: The Gymnasium environment; its task has to be the policy's.
         preprocessing: As for ``read_zip``; files of this package say it themselves.
+        other_robot: Whether the robot may be another than the one that the policy was made for.
 
     Raises:
         FileNotFoundError: If there is no such file, nor a shipped policy of that name.
-        ValueError: If the file is no policy, or one for another task.
+        ValueError: If the file is no policy, or one for another task; or if the task is not as it
+            was when the policy was made, with what differs.
 
     Example:
         >>> import tca_mj
@@ -56,6 +63,7 @@ def load_policy(
     if spec is not None and spec.id != saved.task.rpartition(":")[2]:
         raise ValueError(f"source must be a policy for {spec.id}, got {source} for {saved.task}")
     require_arguments(saved.arguments, env)
+    _require_contract(path, saved.made_for, env, other_robot)
     if saved.network is not None:
         _require_spaces(path, saved.network, 2 if saved.kind == "residual" else 0, env)
     return saved.make(env)
@@ -112,6 +120,17 @@ def require_arguments(arguments: Mapping[str, Any], env: gym.Env[Any, Any]) -> N
         needed = arguments.get(name) or usual[name]
         if needed != value:
             raise ValueError(f"{name} must be {needed!r} for this policy, got {value!r}")
+
+
+def _require_contract(
+    path: Path, made_for: Mapping[str, Any], env: gym.Env[Any, Any], other_robot: bool
+) -> None:
+    """Refuses an environment that is not what a policy was made for."""
+    needed = {name: part for name, part in made_for.items() if not (other_robot and name == ROBOT)}
+    apart = differences(needed, contract(env)) if needed else []
+    if apart:
+        hint = " (other_robot=True takes it)" if apart[-1].startswith(ROBOT) else ""
+        raise ValueError(f"env must be what {path} was made for, got {' | '.join(apart)}{hint}")
 
 
 @door

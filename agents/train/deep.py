@@ -32,6 +32,7 @@ from tca_mj.agents.episode import RECORDING, VIDEO, Episode
 from tca_mj.agents.output import write_csv
 from tca_mj.agents.policies import Model, Network, SavedPolicy, Statistics
 from tca_mj.agents.policies.actors import first_gait
+from tca_mj.agents.policies.contracts import contract
 from tca_mj.agents.progress import progress_bar
 from tca_mj.agents.rollout import earned, rollout
 from tca_mj.agents.train.config import TrainConfig
@@ -184,6 +185,7 @@ class Run:
         self.test_env: gym.Env[Any, Any] = make(config.task, **config.arguments)
         task: Any = self.test_env.unwrapped
         self._units = task.observation.units if config.scaled else None
+        self._made_for = contract(self.test_env)
         self.board = folder.tensorboard(self.model.num_timesteps)
         for kind, known_rows in (("training", self.rows), ("evaluation", self.evaluations)):
             if known_rows and known_rows[-1]["steps"] == self.model.num_timesteps:
@@ -228,6 +230,7 @@ class Run:
         return SavedPolicy(
             task=config.task, network=exported(self.model, self.normalise, self._units), gait=gait,
             steering=steering, bound=config.residual, arguments=config.arguments,
+            made_for=self._made_for,
             origin=self.folder.origin(config.algorithm, self.model.num_timesteps, source),
         )  # fmt: skip
 

@@ -63,7 +63,7 @@ def benchmark(
         ValueError: If ``scale`` is not above 0 and at most 1, or there is no such task.
     """
     number("scale", scale, above=0.0, at_most=1.0)
-    id = task or next(iter(DEMOS.values()))
+    id = task or next(iter(DEMOS.values())).task
     env = make(id, disable_env_checker=True, **arguments_of("scripted", id)).unwrapped
     policy = scripted(env)
     steps, repetitions = max(int(400 * scale), 4), max(int(100 * scale), 2)

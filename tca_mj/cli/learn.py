@@ -30,6 +30,9 @@ def add_commands(commands: Commands) -> None:
     add(evaluation, "--seed", "of the first episode; default 0")
     add(evaluation, "--randomise", "share by which the robot is drawn to be off, 0 to 0.5;"
         " default 0", type=parse_number, default=0.0, metavar="SHARE")  # fmt: skip
+    add(evaluation, "--option", "an option of every reset; may be given several times",
+        action="append", default=[], type=parse_option, metavar="NAME=VALUE",
+        dest="options")  # fmt: skip
     add(evaluation, "--steps", "of an episode; default: the task's")
     add(evaluation, "--model", "used, or one of the task's finer models, as `list` has it",
         default="used")  # fmt: skip
@@ -103,6 +106,7 @@ def _eval(arguments: argparse.Namespace) -> int:
     out = arguments.out or Path("runs/eval") / name
     settings = ("task", "policy", "episodes", "seed", "randomise", "steps", "model", "timestep")
     given = {key: getattr(arguments, key) for key in settings}
+    given["options"] = dict(arguments.options)
     evaluation = Evaluation(**given, **how_trained(arguments))
     arguments.kept.append(f"what was finished is in {out}")
     summary = evaluate(evaluation, out=out, workers=arguments.workers, fresh=arguments.fresh)

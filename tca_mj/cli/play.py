@@ -34,7 +34,7 @@ Without a screen you can
 
 def add_commands(commands: Commands) -> None:
     """Adds demo, export, list and view."""
-    demo = add_command(commands, "demo", _demo, help="run a scripted demo and record it")
+    demo = add_command(commands, "demo", _demo, help="run a demo and record it")
     add(demo, "name", "which demo", nargs="?", choices=list(DEMOS))
     add(demo, "--policy", f"{', '.join(POLICIES)}, a shipped one, a file or a run")
     add(demo, "--task", "the policy's task")
@@ -71,8 +71,8 @@ def add_commands(commands: Commands) -> None:
 
 
 def _demo(arguments: argparse.Namespace) -> int:
-    """Runs one scripted episode, or with --policy and --task one of any policy in any task, and
-    writes into the folder --out:
+    """Runs one episode that is worth seeing, or with --policy and --task one of any policy in any
+    task, and writes into the folder --out:
       summary.json   success, energy, peak temperatures, duration, versions, machine
       rollout.rrd    everything over time; open it with `rerun rollout.rrd`
       rollout.mp4    a film (needs OpenGL and the extra demo)
@@ -92,12 +92,16 @@ def _demo(arguments: argparse.Namespace) -> int:
     named = arguments.name is not None
     if named == (arguments.policy is not None) or named == (arguments.task is not None):
         raise ValueError("give a demo's name, or --policy and --task")
-    task = DEMOS[arguments.name] if named else arguments.task
+    demo = DEMOS[arguments.name] if named else None
+    task, policy = (demo.task, demo.policy) if demo else (arguments.task, arguments.policy)
+    how = how_trained(arguments)
+    if demo:
+        how["arguments"] = {**demo.arguments, **how["arguments"]}
     out = arguments.out or Path("runs/demo") / (arguments.name or task_name(task))
     arguments.kept.append(f"what was recorded is in {out}")
     summary = play(
-        task, "scripted" if named else arguments.policy, seed=arguments.seed, out=out,
-        options=dict(arguments.options), video=arguments.video, **how_trained(arguments),
+        task, policy, seed=arguments.seed, out=out, options=dict(arguments.options),
+        video=arguments.video, **how,
     )  # fmt: skip
     if len(summary.get("speeds", ())) > 1:
         print(speed_table(summary))
@@ -171,7 +175,6 @@ def _list(arguments: argparse.Namespace) -> int:
     from tca_mj.agents.policies import SavedPolicy, shipped
 
     policies = {name: SavedPolicy.read(path) for name, path in shipped().items()}
-    demos = {task: name for name, task in DEMOS.items()}
     for task in arguments.task or [task.id for task in TASKS]:
         env = make(task, disable_env_checker=True)
         about = (type(env.unwrapped).__doc__ or "").strip().partition("\n")[0]
@@ -181,8 +184,9 @@ def _list(arguments: argparse.Namespace) -> int:
         print(f"    options {', '.join(env.unwrapped.options.names)}")
         if task_class(task).finer:
             print(f"    finer models {', '.join(task_class(task).finer)}")
-        if task in demos:
-            print(f"    demo {demos[task]}")
+        demos = [demo.name for demo in DEMOS.values() if demo.task == find_task(task).id]
+        if demos:
+            print(f"    demo {', '.join(demos)}")
         for name, policy in policies.items():
             if policy.task == find_task(task).id:
                 print(f"    policy {name}: {policy.kind} by {policy.origin.algorithm}")
