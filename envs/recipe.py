@@ -28,12 +28,13 @@ class Recipe(Checked):
         scaled: Whether observations are scaled by the table; otherwise they, and the rewards, are
             normalised by running statistics.
         mirrored: Whether half of each batch of memories is mirrored, left for right.
+        wandering: The option that draws commands: where it is given, and not 0, memories are also
+            told with other commands; empty if there is none.
         discount: What a reward is worth that comes a second later, above 0 up to 1; None for the
             learner's own, per step [1].
         learner: What else differs from the algorithm's defaults, under the names of
             Stable-Baselines3.
         interval: Steps between two points of the learning curve; None for the trainer's own.
-        measured: What is known of it, for who asks; empty if nothing is.
 
     Raises:
         ValueError: If a field is out of bounds.
@@ -46,7 +47,7 @@ class Recipe(Checked):
     options: Mapping[str, float] = field(default_factory=dict)
     scaled: bool = False
     mirrored: bool = False
+    wandering: str = ""
     discount: _Discount | None = None
     learner: Mapping[str, Any] = field(default_factory=dict)
     interval: _Steps | None = None
-    measured: str = ""

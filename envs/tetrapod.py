@@ -13,7 +13,14 @@ from numpy.typing import ArrayLike, NDArray
 
 from tca_mj.assets import mjcf
 from tca_mj.checks import door, number, require_one_of
-from tca_mj.envs.command import Command, Following, command_options, commanded, drawn
+from tca_mj.envs.command import (
+    Command,
+    Following,
+    Retelling,
+    command_options,
+    commanded,
+    drawn,
+)  # fmt: skip
 from tca_mj.envs.options import Constant, Option, Options, Setup, Uniform, variation_options
 from tca_mj.envs.recipe import Recipe
 from tca_mj.envs.stance import CAMERAS, LEG_TCAS, Stance, tetrapod_scene
@@ -181,7 +188,7 @@ class TetrapodGait(SimulatedTask):
     recipes = {
         "sac": Recipe(
             steps=12_000, control_period=0.5, timestep=10e-3, options={"randomise": 0.2},
-            scaled=True, mirrored=True, discount=0.94, interval=1000, learner=_LEARNER,
+            scaled=True, mirrored=True, wandering="wander", discount=0.94, interval=1000, learner=_LEARNER,
         ),
     }  # fmt: skip
     bend_range: ClassVar[float] = math.radians(1.0)  # largest deviation of the body's bend [rad]
@@ -419,12 +426,19 @@ class TetrapodGait(SimulatedTask):
             "heading error": now.error,
         }
 
+    @property
+    def retelling(self) -> Retelling:
+        """How memories are told with other commands."""
+        task = self.task
+        return Retelling(self.observation, task.speed, task.fastest, task.ways, self.control_period)
+
     def details(self) -> dict[str, Any]:
-        """Headway [m] and speed [m/s]."""
+        """Headway [m], speed [m/s] and how far it looks from where it ought to [rad]."""
         time = self.sim.time
         return {
             "distance": self._following.along,
             "drift": self._following.aside,
+            "across": self._following.across,
             "heading_error": self._following.error,
             "speed": self._following.along / time if time > 0.0 else 0.0,
         }

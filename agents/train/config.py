@@ -127,6 +127,7 @@ class TrainConfig(Checked):
         scaled: Whether observations are scaled by the task's table; otherwise they and the rewards
             are normalised by running statistics.
         mirrored: Whether half of each batch of memories is mirrored, left for right.
+        retold: Whether memories are also told with other commands.
         residual: Largest correction of a gait's temperatures, which is what is learned then; 0 for
             a policy of its own [K].
         start: The gait that is corrected: ``scripted``, ``trot``, or a policy's file or name.
@@ -150,6 +151,7 @@ class TrainConfig(Checked):
     timestep: Positive | None = None
     scaled: bool = False
     mirrored: bool = False
+    retold: bool = False
     residual: Annotated[float, partial(number, at_least=0.0, at_most=50.0, unit="K")] = 0.0
     start: str = "scripted"
     interval: Steps = 10_000
@@ -168,6 +170,8 @@ class TrainConfig(Checked):
                 f"mirrored must be False without memories of scaled observations, got True for"
                 f" {self.algorithm}"
             )
+        if self.retold and not self.mirrored:
+            raise ValueError("retold must be False where memories are not mirrored, got True")
         if self.residual and not task.legs:
             raise ValueError(
                 f"residual must be 0 for {self.task}, which has no gait, got {self.residual}"
@@ -208,14 +212,16 @@ def default_config(task: str, algorithm: str | None = None, **change: Any) -> Tr
     learner = dict(recipe.learner)
     if recipe.discount is not None:
         learner["gamma"] = recipe.discount ** (period or known.control_period)
+    options = {**recipe.options, **change.pop("options", {})}
     common: dict[str, Any] = {
         "learner": (OnPolicy if algorithm == "ppo" else OffPolicy)(**learner),
         "steps": recipe.steps,
-        "options": {**recipe.options, **change.pop("options", {})},
+        "options": options,
         "arguments": arguments,
         "timestep": recipe.timestep,
         "scaled": recipe.scaled,
         "mirrored": recipe.mirrored,
+        "retold": recipe.mirrored and bool(options.get(recipe.wandering)),
     }
     if recipe.interval is not None:
         common["interval"] = recipe.interval
@@ -242,6 +248,7 @@ def described(config: TrainConfig) -> str:
         *([f"physics at {1e3 * config.timestep:g} ms"] if config.timestep else []),
         *(["scaled observations"] if config.scaled else []),
         *(["mirrored memories"] if config.mirrored else []),
+        *(["told with other commands"] if config.retold else []),
         *(f"{name} {value}" for name, value in config.options.items()),
         f"{config.envs} environments", f"seed {config.seed}",
     ]  # fmt: skip

@@ -311,7 +311,7 @@ def _learner(config: TrainConfig, env: VecNormalize) -> BaseAlgorithm:
         settings["action_noise"] = NormalActionNoise(np.zeros(n), np.full(n, settings["noise"]))
     if config.mirrored:
         assert isinstance(env.unwrapped, TaskVecEnv)
-        settings |= mirrored_memory(env.unwrapped)
+        settings |= mirrored_memory(env.unwrapped, retold=config.retold, seed=config.seed)
     known = inspect.signature(kind).parameters
     model: BaseAlgorithm = kind(
         "MlpPolicy", env, seed=config.seed, device="cpu", policy_kwargs=network,

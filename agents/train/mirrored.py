@@ -1,4 +1,4 @@
-"""Memories of which half are mirrored, left for right: a robot learns on both sides at once."""
+"""Memories of which half are mirrored, left for right, and many are told with other commands."""
 
 from __future__ import annotations
 
@@ -6,11 +6,14 @@ from typing import Any
 
 import numpy as np
 import torch
+from numpy.typing import NDArray
 from stable_baselines3.common.buffers import ReplayBuffer
 from stable_baselines3.common.type_aliases import ReplayBufferSamples
 
 from tca_mj.agents.train.sb3_env import TaskVecEnv
 from tca_mj.envs.table import Table
+
+_RETOLD = 5  # all but one in so many are told anew
 
 
 class MirroredReplayBuffer(ReplayBuffer):
@@ -19,51 +22,90 @@ class MirroredReplayBuffer(ReplayBuffer):
     What a robot does is as good when left and right are swapped, where the task's tables say what
     that makes of an observation and of an action. Which memories a batch has is drawn as by
     ``ReplayBuffer``.
+
+    With ``retelling`` four of five memories come as if another command had been given, which is
+    drawn anew each time: what a body does is worth something else then, and no less true.
     """
 
-    def __init__(self, *args: Any, observation: Table, action: Table, **kwargs: Any) -> None:
+    def __init__(
+        self,
+        *args: Any,
+        observation: Table,
+        action: Table,
+        retelling: Any = None,
+        seed: int = 0,
+        **kwargs: Any,
+    ) -> None:
         """Takes the arguments of ``ReplayBuffer``, and the tables of a task.
 
         Args:
             *args: As for ``ReplayBuffer``.
-            observation: What is seen.
+            observation: What is seen, scaled.
             action: What is done.
-            **kwargs: As for ``ReplayBuffer``.
+            retelling: What tells memories with other commands, as ``Retelling``; None for nothing.
+            seed: Seed of those commands.
+            **kwargs: As for ``ReplayBuffer``, which must not save memory here.
 
         Raises:
             ValueError: If the tables know no mirror.
         """
         super().__init__(*args, **kwargs)
-        self._observation, self._action = (
+        self._mirrors = [
             tuple(torch.as_tensor(part, device=self.device) for part in table.mirror)
             for table in (observation, action)
-        )
+        ]
+        self._retelling, self._random = retelling, np.random.default_rng(seed)
+        self._notes = np.zeros((self.buffer_size, self.n_envs, 3))
+        self._ways = np.zeros((self.n_envs, 2))  # along and across at the last step
 
-    def _get_samples(self, batch_inds: np.ndarray, env: Any = None) -> ReplayBufferSamples:
-        samples = super()._get_samples(batch_inds, env)
+    def add(self, obs: Any, next_obs: Any, action: Any, reward: Any, done: Any, infos: Any) -> None:
+        """Keeps a step of every environment."""
+        if self._retelling is not None:
+            noted = np.array([self._retelling.notes(info) for info in infos])
+            gained = noted[:, :2] - self._ways
+            self._notes[self.pos] = np.column_stack([gained, noted[:, 2]])
+            self._ways = np.where(np.asarray(done)[:, None], 0.0, noted[:, :2])
+        super().add(obs, next_obs, action, reward, done, infos)
+
+    def _get_samples(self, batch_inds: NDArray[Any], env: Any = None) -> ReplayBufferSamples:
+        where = batch_inds, np.random.randint(0, high=self.n_envs, size=len(batch_inds))
+        seen, after = self.observations[where], self.next_observations[where]
+        reward, done = self.rewards[where], self.dones[where] * (1.0 - self.timeouts[where])
+        if self._retelling is not None:
+            which = np.arange(len(batch_inds)) % _RETOLD > 0
+            seen[which], after[which], reward[which] = self._retelling.told(
+                seen[which], after[which], reward[which], self._notes[where][which], self._random
+            )
         half = len(batch_inds) // 2
 
-        def swapped(rows: torch.Tensor, mirror: tuple[torch.Tensor, ...]) -> torch.Tensor:
-            source, sign = mirror
+        def mirrored(values: Any, mirror: Any) -> torch.Tensor:
+            rows, (source, sign) = self.to_torch(values), mirror
             return torch.cat([rows[:half, source] * sign, rows[half:]])
 
-        return samples._replace(
-            observations=swapped(samples.observations, self._observation),
-            next_observations=swapped(samples.next_observations, self._observation),
-            actions=swapped(samples.actions, self._action),
+        observation, action = self._mirrors
+        return ReplayBufferSamples(
+            observations=mirrored(seen, observation),
+            actions=mirrored(self.actions[where], action),
+            next_observations=mirrored(after, observation),
+            dones=self.to_torch(done.reshape(-1, 1)),
+            rewards=self.to_torch(reward.reshape(-1, 1)),
         )
 
 
-def mirrored_memory(tasks: TaskVecEnv) -> dict[str, Any]:
+def mirrored_memory(
+    tasks: TaskVecEnv, *, retold: bool = False, seed: int = 0
+) -> dict[str, Any]:
     """Arguments of an off-policy learner of Stable-Baselines3 whose memories are mirrored.
 
         SAC("MlpPolicy", tasks, **mirrored_memory(tasks))
 
     Args:
         tasks: What it learns in, with scaled observations: running statistics know no mirror.
+        retold: Whether memories are also told with other commands.
+        seed: Seed of those commands.
 
     Raises:
-        ValueError: If observations are not scaled, or the task knows no mirror.
+        ValueError: If observations are not scaled, or the task knows no mirror or no commands.
     """
     if not tasks.scaled:
         raise ValueError("tasks must give scaled observations, got scaled=False")
@@ -71,7 +113,13 @@ def mirrored_memory(tasks: TaskVecEnv) -> dict[str, Any]:
     for name, table in (("observation", task.observation), ("action", task.action)):
         if not table.symmetric:
             raise ValueError(f"tasks must know a mirror, got none in the table of its {name}")
+    retelling = getattr(task, "retelling", None)
+    if retold and retelling is None:
+        raise ValueError("tasks must follow commands to be told others, got a task without")
     return {
         "replay_buffer_class": MirroredReplayBuffer,
-        "replay_buffer_kwargs": {"observation": task.observation, "action": task.action},
-    }
+        "replay_buffer_kwargs": {
+            "observation": task.observation, "action": task.action,
+            "retelling": retelling if retold else None, "seed": seed,
+        },
+    }  # fmt: skip
