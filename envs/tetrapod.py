@@ -188,7 +188,8 @@ class TetrapodGait(SimulatedTask):
     recipes = {
         "sac": Recipe(
             steps=12_000, control_period=0.5, timestep=10e-3, options={"randomise": 0.2},
-            scaled=True, mirrored=True, wandering="wander", discount=0.94, interval=1000, learner=_LEARNER,
+            scaled=True, mirrored=True, wandering="wander", discount=0.94, interval=1000,
+            learner=_LEARNER,
         ),
     }  # fmt: skip
     bend_range: ClassVar[float] = math.radians(1.0)  # largest deviation of the body's bend [rad]
