@@ -16,9 +16,9 @@ from typing import Annotated, Any
 import gymnasium
 from gymnasium.envs.registration import EnvSpec, load_env_creator
 
-from tca_mj.checks import Checked, door, number, shown, whole
+from tca_mj.checks import Checked, door, quantity, shown, whole
 
-ControlPeriod = Annotated[float, partial(number, above=0.0, at_most=60.0, unit="s")]
+ControlPeriod = Annotated[float, partial(quantity, above=0.0, at_most=60.0, unit="s")]
 """Time of a step of a task: in a minute each of these robots has come to rest."""
 MOST_EPISODE = 10_000_000
 """Most steps of an episode, 11 days of the shortest control period in use, 0.1 s."""

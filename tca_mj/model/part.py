@@ -70,7 +70,7 @@ class Part(Checked):
             The text of the file.
 
         Raises:
-            ValueError, SimulationDiverged: As ``tca_mj.export``.
+            ValueError, OSError, SimulationDiverged: As ``tca_mj.export``.
         """
         import tca_mj
 

@@ -141,6 +141,7 @@ def rollout_plot(
 
     Raises:
         ImportError: If Matplotlib is not installed.
+        OSError: If the file cannot be written.
         ValueError: If the shapes do not fit, a time is not finite, or the path's ending is that of
             no picture.
     """

@@ -107,6 +107,9 @@ def write_csv(recording: Recording, path: str | Path) -> None:
     Args:
         recording: What ``read`` gave.
         path: The file to write.
+
+    Raises:
+        OSError: If it cannot be written.
     """
     times = np.unique(np.concatenate([c.time for c in recording.curves.values()] or [np.zeros(0)]))
     heads = [f"{name} [{curve.unit}]" for name, curve in recording.curves.items()]

@@ -25,7 +25,7 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tca_mj.checks import door, instance, shown, whole
+from tca_mj.checks import door, floats, instance, shown, whole
 from tca_mj.forks import Held, keep_for_ever
 from tca_mj.record.plots import temperature_colour
 
@@ -164,9 +164,8 @@ def colour_tendons(model: mujoco.MjModel, tendon: ArrayLike, temperature: ArrayL
         ValueError: If there is no such tendon, or there are other than n temperatures.
     """
     instance("model", model, mujoco.MjModel)
-    ids, colours = np.asarray(tendon), temperature_colour(temperature)
-    whole_numbers = ids.ndim == 1 and (ids.dtype.kind in "iu" or not ids.size)
-    if not whole_numbers or ((ids < 0) | (ids >= model.ntendon)).any():
+    ids, colours = floats("tendon", tendon, empty=True), temperature_colour(temperature)
+    if ids.ndim != 1 or (ids % 1.0).any() or ((ids < 0) | (ids >= model.ntendon)).any():
         raise ValueError(f"tendon must be ids below {model.ntendon} in a row, got {shown(tendon)}")
     if colours.shape != (ids.size, 3):
         raise ValueError(f"temperature must be {ids.size} numbers, got {shown(temperature)}")

@@ -28,7 +28,7 @@ from tca_mj.model.surface import TOUCHES_NOTHING, surface
 from tca_mj.model.tendon import Pass, RoutedTca, lay_tca
 from tca_mj.modules.continuum_leg import LegSpec, continuum_leg
 from tca_mj.rod.beam import BeamSpec, Outline
-from tca_mj.routes import Helix
+from tca_mj.routes import Helix, TcaCount
 from tca_mj.smp import HeaterSpec, SpineSpec
 from tca_mj.smp.lumped import in_tube
 from tca_mj.tca import CATALOGUE, TcaSpec
@@ -98,7 +98,7 @@ class TetrapodSpec(Checked):
         return tuple(self.spacing * (i - (SPINES - 1) / 2) for i in range(SPINES))
 
     @door
-    def body(self, *, count: int, length: float, curves: float) -> BeamSpec:
+    def body(self, *, count: TcaCount, length: Positive, curves: float) -> BeamSpec:
         """Some of the spines as one beam, but for what shape memory adds.
 
         Args:

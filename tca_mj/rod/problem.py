@@ -82,7 +82,8 @@ class Segment(Checked):
             _require_legs(f"routes[{i}]", route)
         if self.strands is not None:
             object.__setattr__(self, "strands", _tuple("strands", self.strands))
-            if not len(self.routes) == len(self.strands) == len(set(self.strands)):
+            same = len(self.routes) == len(self.strands) == len(set(self.strands))
+            if not (same and all(name == name for name in self.strands)):
                 raise ValueError(
                     f"strands must be {len(self.routes)} different names, one per route, got"
                     f" {self.strands}"
