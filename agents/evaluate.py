@@ -38,6 +38,7 @@ from tca_mj.registry import EpisodeSteps, episode_steps, make, task_class
 from tca_mj.sim import Timestep
 
 REPORT = "summary.md"
+_Real = Annotated[float, number]  # also one that is 0 but for rounding
 
 # Name, unit, factor to the unit, and digits of what is reported.
 METRICS = {
@@ -362,7 +363,7 @@ def label(name: str) -> str:
 
 
 @door
-def cell(name: str, figure: Mapping[str, float | None], *, interval: bool = True) -> str:
+def cell(name: str, figure: Mapping[str, _Real | None], *, interval: bool = True) -> str:
     """A figure in its unit: mean, and the interval in brackets.
 
     Args:

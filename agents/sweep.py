@@ -25,7 +25,7 @@ from tca_mj.agents.evaluate import METRICS, Evaluation, cell, evaluate, label
 from tca_mj.agents.output import read_json, write_csv, write_json
 from tca_mj.agents.progress import progress_bar
 from tca_mj.agents.workers import Processes
-from tca_mj.checks import Checked, door, require_one_of, shown, whole
+from tca_mj.checks import Checked, door, instance, require_one_of, shown, whole
 from tca_mj.files import claimed, write_whole
 from tca_mj.machine import machine, versions
 from tca_mj.pages import table
@@ -196,7 +196,10 @@ def run_sweep(
     trials = sweep.trials()
     files = [out / TRIALS / trial.name / RESULT for trial in trials]
     with claimed(out):
-        held = [_result(file) if file.is_file() else None for file in files]
+        held = [
+            _result(file, trial.point) if file.is_file() else None
+            for file, trial in zip(files, trials, strict=True)
+        ]
         missing = [trial for trial, result in zip(trials, held, strict=True) if result is None]
         for trial in missing:
             if sweep.algorithm is None:
@@ -205,7 +208,10 @@ def run_sweep(
                  "machine": machine(), "command": repr(sweep)}  # fmt: skip
         write_json(out / ABOUT, about, indent=1)
         errors = _tune(missing, out, workers, address, failures) if missing else {}
-        found = [_result(file) for file in files if file.is_file()]
+        found = [
+            _result(file, trial.point)
+            for file, trial in zip(files, trials, strict=True) if file.is_file()
+        ]
         _write(sweep, found, out)
     if errors:
         raise RuntimeError(f"{len(errors)} trials ended in an error: {errors}")
@@ -253,16 +259,24 @@ def _tune(
         }
 
 
-def _result(file: Path) -> dict[str, Any]:
-    """What a trial has found.
+def _result(file: Path, point: Mapping[str, Value]) -> dict[str, Any]:
+    """What the trial of a point has found.
 
     Raises:
         ValueError: If the file is broken.
     """
     found = read_json(file)
-    if not all(isinstance(found.get(name), dict) for name in ("point", "figures")):
-        raise ValueError(f"{file} must have point and figures; remove it to run the trial again")
-    return found
+    figures = found.get("figures")
+    try:
+        require_one_of("point", found.get("point"), [dict(point)])
+        instance("figures", figures, dict)
+        for name, figure in figures.items():
+            cell(name, figure)
+    except ValueError as error:
+        raise ValueError(
+            f"{file} must be what the trial has found, or be removed to run it again: {error}"
+        ) from error
+    return {"point": dict(point), "figures": figures}
 
 
 def _last_line(error: Exception) -> str:

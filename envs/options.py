@@ -117,6 +117,7 @@ class Options:
         Raises:
             ValueError: If an option is unknown or cannot have its value.
         """
+        instance("random", random, np.random.Generator)
         instance("options", given, Mapping)
         unknown = [key for key in given if key not in self.names]
         if unknown:

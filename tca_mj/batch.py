@@ -131,7 +131,7 @@ class SimulationBatch(Held):
         return errors
 
     def __del__(self) -> None:
-        if self.elsewhere and hasattr(self, "physics"):
+        if hasattr(self, "physics") and self.elsewhere:
             keep_for_ever(self.physics)  # it would wait for its threads
 
     def _bank_of(self, sims: Sequence[Simulation]) -> Any:

@@ -29,6 +29,7 @@ from tca_mj.checks import (
     every,
     number,
     require_one_of,
+    shown,
     text,
 )
 from tca_mj.couple import Inputs, Writes, advance, measure, write
@@ -152,8 +153,8 @@ class Simulation:
             supply: What the commands of ``step`` mean; by default they are powers.
 
         Raises:
-            ValueError: If a number is out of range, the period is no multiple of the time step, or
-                there is no such ``law``.
+            ValueError: If a number is out of range, the period is no multiple of the time step,
+                there is no such ``law``, or MuJoCo cannot compile the part.
         """
         number("tca_period", tca_period, at_most=MOST_SUBSTEPS * timestep, unit="s")
         substeps = round(tca_period / timestep)
@@ -163,9 +164,13 @@ class Simulation:
             )
         count_warnings()
         part.spec.option.timestep = timestep
-        if not part.spec.lights:  # of no influence but on pictures, which would be black
-            stage(part)
-        self.model: mujoco.MjModel = part.spec.compile()
+        try:
+            if not part.spec.lights:  # of no influence but on pictures, which would be black
+                stage(part)
+            self.model: mujoco.MjModel = part.spec.compile()
+        except ValueError as error:
+            name = part.spec.modelname
+            raise ValueError(f"part must compile, got {name!r}: {error}") from error
         self.data = mujoco.MjData(self.model)
         self.tca_period = tca_period
         self.chains = part.members
@@ -268,6 +273,8 @@ class Simulation:
             ValueError: As ``keep``; or as ``step``, if 0.1 s are no multiple of ``tca_period``.
             SimulationDiverged: As ``step``.
         """
+        if np.shape(temperature) not in ((), (self.n,)):
+            raise ValueError(f"temperature must be one or {self.n}, got {shown(temperature)}")
         ambient, left = np.asarray(self.bank.heat.ambient), np.inf
         told, self.bank.supply = self.bank.supply, Supply()
         try:

@@ -15,6 +15,7 @@ import numpy as np
 
 from tca_mj.agents.output import read_json, write_json
 from tca_mj.agents.policies import Origin
+from tca_mj.checks import shown
 from tca_mj.files import require_room, write_whole
 from tca_mj.machine import machine, versions
 
@@ -59,12 +60,12 @@ class RunFolder:
             if not isinstance(held, dict):
                 raise ValueError(f"{file} must have a config: it is broken, or another file")
             other = [
-                f"{name} {held.get(name)!r}, not {settings.get(name)!r}"
+                f"{name:.80} {shown(held.get(name))}, not {shown(settings.get(name))}"
                 for name in sorted(held.keys() | settings.keys())
                 if held.get(name) != settings.get(name) and name != "steps"
             ]
             if other:
-                raise ValueError(f"{path} holds a run with {'; '.join(other)}")
+                raise ValueError(f"{file} holds a run with {'; '.join(other[:5])}")
         made = {"versions": versions(*LIBRARIES), "machine": machine()}
         write_json(file, {"config": settings, "command": command, **made})
 
