@@ -1,25 +1,26 @@
 """Calls what the package offers with hostile arguments, and judges what comes of it.
 
 ``surfaces`` walks what the packages offer and finds functions, constructors, class methods and
-methods, whoever adds one; of the tasks in the registry it finds the arguments, the options of
-``reset``, the figures of the robot and the action. A call gets what its annotations ask for, but
-for an argument or two that are hostile: not a number, huge, of a wrong kind, shape or
-specification. It may return something without a NaN, or raise ``ValueError`` with name, value and
-bound, or what its docstring says under ``Raises:``, within 30 s.
+methods, whoever adds one; of the tasks in the registry the arguments, the options of ``reset``,
+the figures of the robot and the action, alone and side by side; and the files that are read. A
+call gets what its annotations ask for, but for an argument or two that are hostile: not a number,
+huge, of a wrong kind, shape or specification. It may return something without a NaN, or raise
+``ValueError`` with name, value and bound, or what its docstring says under ``Raises:``, within
+30 s.
 
 ``python tests/fuzzing.py 10000 FOLDER`` tries ten thousand cases, goes on where it was stopped,
-and writes a table.
+and prints a table.
 """
 
-import datetime
 import faulthandler
 import inspect
+import json
 import math
+import os
 import re
 import resource
 import signal
 import sys
-import typing
 import warnings
 import zlib
 from collections import Counter
@@ -29,38 +30,29 @@ from dataclasses import dataclass, field, fields, is_dataclass
 from enum import Enum
 from functools import cache, partial
 from pathlib import Path
-from types import NoneType, UnionType
-from typing import Annotated, Any, Literal, Union, get_args, get_origin
+from typing import Any
 
-import gymnasium as gym
-import mujoco
 import numpy as np
+from fuzz_files import READERS, damages, spoilt
+from fuzz_samples import HOSTILE, SEVERAL, good, hostile_of, parameters_of, spread_of
 from hypothesis import HealthCheck, Phase, given, seed, settings
 from hypothesis import strategies as st
-from numpy.polynomial import Polynomial
-from numpy.typing import ArrayLike
 from test_names import offered
 
 import tca_mj
-from tca_mj import checks, control, rod, variation
+from tca_mj import checks
 from tca_mj.agents.design import designed
-from tca_mj.agents.policies.network import Network
-from tca_mj.agents.train.config import OffPolicy
-from tca_mj.assets import mjcf
-from tca_mj.envs.task import SimulatedTask, TaskArguments
+from tca_mj.envs.task import TaskArguments
 from tca_mj.envs.vector import TaskVector
-from tca_mj.model.chain import Chain
-from tca_mj.model.tendon import route_passes
-from tca_mj.modules.bending import bending_module
+from tca_mj.pages import table
 from tca_mj.registry import TASKS, task_class
 from tca_mj.registry import find_task as task_spec
 
-SEVERAL = object()  # what stands for the default of *arguments, of which one is given
-SECONDS = 30  # longest time of a case
+SECONDS = 30  # of computing, longest time of a case; ten times that on the clock
 MEMORY = 6 << 30  # largest memory that a case may take besides [bytes]
 
 # What is no door, and why: modules, and things in them.
-_PROGRAM = "a program that runs for minutes; its command is fuzzed"
+_PROGRAM = "a program that runs for minutes"
 _KERNEL = "a kernel: arrays of numbers that were checked"
 _SCREEN = "needs a screen"
 _ACTS = "acts on what a task has shown"
@@ -74,7 +66,8 @@ NO_DOOR = {
             "tca.laws.rod.CoilRods.torsion_per_tension", "tca.thermal.HeatStep.advance",
             "sim.Simulation.take", "tca.dynamics.stepping.LoadedTcas.heated",
             "tca.dynamics.stepping.LoadedTcas.pull", "tca.supply.Supply.power",
-            "tca.dynamics.stepping.LoadedTcas.check_domain", "tca.supply.Supply.like", "actuation",
+            "tca.dynamics.stepping.LoadedTcas.check_domain", "tca.bank.TcaBank.pulls",
+            "tca.supply.Supply.like", "actuation",
             "smp.bank.SpineBank.advance", "envs.options.Uniform.__call__",
             "envs.options.Constant.__call__",
         ),
@@ -97,36 +90,44 @@ NO_DOOR = {
     **dict.fromkeys(("envs.viewer", "record.render.Offscreen", "record.film.Film.frame",
                      "record.render.gl_backend"), _SCREEN),
 }  # fmt: skip
+# Where not a number is what a result says, as its docstring does.
+NAN_MEANS_NONE = ("tca.bank.TcaBank.signals",)
+# Words by which messages call parameters.
+SAID_AS = {
+    "given": "options", "temperatures": "temperature", "drives": "drive", "value": "x",
+    "command": "power", "arena": "path", "chains": "joints", "routes": "tensions",
+}
+# Kinds of surfaces, as they are counted.
+CONSTRUCTOR, FUNCTION, METHOD = "constructors", "functions and class methods", "methods"
+ARGUMENTS, OPTIONS, ACTION = "arguments of tasks", "options of `reset`", "actions"
+ROBOT, VECTOR, FILE = "specifications of robots", "vector environments", "files that are read"
 
 
 class Hangs(BaseException):
     """A case took longer than ``SECONDS``."""
 
 
-class NoSample(LookupError):
-    """Nothing is known that an argument could be."""
-
-
 @dataclass(frozen=True)
 class Surface:
-    """What is called: its name, the function, and the kind of object that it is a method of.
+    """What is called: its name, what it is, the function, and the kind of object it is a method of.
 
-    ``named`` are parameters that the function takes as ``**named``, with values near which things
-    become wrong.
+    ``named`` are parameters that the function takes as ``**named``: for each what is hostile to it,
+    or values near which things become wrong.
     """
 
     name: str
+    kind: str
     function: Callable[..., Any]
     owner: Any = None
     errors: frozenset[str] = frozenset()
-    named: Mapping[str, tuple[Any, ...]] = field(default_factory=dict)
+    named: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def parameters(self) -> dict[str, tuple[Any, Any]]:
         """Annotation and default of each parameter by name."""
         if self.named:
             return {name: (Any, None) for name in self.named}
-        return _parameters(self.function)
+        return parameters_of(self.function)
 
     def call(self, arguments: Mapping[str, Any]) -> Any:
         given = dict(arguments)
@@ -135,22 +136,12 @@ class Surface:
         return self.function(*before, *several, **given)
 
 
-@cache
-def _parameters(function: Any) -> dict[str, tuple[Any, Any]]:
-    target = function.__init__ if inspect.isclass(function) else function
-    target = getattr(target, "__func__", target)
-    try:
-        hints = typing.get_type_hints(target, include_extras=True)
-    except (NameError, TypeError):
-        hints = {}
-    found = inspect.signature(target).parameters.values()
-    return {
-        p.name: (hints.get(p.name, Any), SEVERAL if p.kind is p.VAR_POSITIONAL else p.default)
-        for p in found if p.kind is not p.VAR_KEYWORD and p.name not in ("self", "cls")
-    }  # fmt: skip
+def surfaces() -> list[Surface]:
+    """All there is."""
+    return [*_of_packages(), *_of_tasks(), *_of_files()]
 
 
-def surfaces() -> Iterator[Surface]:
+def _of_packages() -> Iterator[Surface]:
     """All that the packages offer, each once, by the module that defines it."""
     seen = set()
     for thing in offered().values():
@@ -162,28 +153,59 @@ def surfaces() -> Iterator[Surface]:
         if not _closed(name) and inspect.isclass(thing):
             yield from _of_class(name, thing)
         elif not _closed(name) and inspect.isfunction(thing):
-            yield Surface(name, thing, errors=_errors(thing))
+            yield Surface(name, FUNCTION, thing, errors=_errors(thing))
 
 
-def tasks() -> Iterator[Surface]:
+def _of_tasks() -> Iterator[Surface]:
     """What can be said to the tasks of the registry."""
-    for task in TASKS:
-        kind = task_class(task.id)
-        known = dict.fromkeys([*_parameters(kind), *TaskArguments.__annotations__], ())
-        yield Surface(f"{task.id} arguments", partial(_constructed, task.id), named=known)
-        rows = {row.name: _near(row.low, row.high) for row in _task(task.id).options.rows}
-        yield Surface(f"{task.id} options", partial(_begun, task.id), named={"seed": ()} | rows)
-        size = _task(task.id).action.size
-        actions = tuple(np.full(size, value) for value in (-1.1, -1.0, 0.3, 1.0, np.nan))
-        yield Surface(f"{task.id} action", partial(_acted, task.id), named={"action": actions})
+    vector = dict.fromkeys(
+        ("num_envs", "num_threads", "max_episode_steps", "autoreset_mode", "reset_options"), ()
+    )
+    for id in (task.id for task in TASKS):
+        kind, task = task_class(id), _task(id)
+        known = dict.fromkeys([*parameters_of(kind), *TaskArguments.__annotations__], ())
+        yield Surface(f"{id} arguments", ARGUMENTS, partial(_constructed, id), named=known)
+        rows = {row.name: _near(row.low, row.high) for row in task.options.rows}
+        yield Surface(f"{id} options", OPTIONS, partial(_begun, id), named={"seed": ()} | rows)
+        n = task.action.size
+        yield Surface(f"{id} action", ACTION, partial(_acted, id), named={"action": _full(n)})
         robot = {
             path: tuple(type(value)(factor * value) for factor in (0.1, 0.4, 0.8, 1.3, 2.5, 10.0))
             for path, value in figures(kind.robot_argument[1]())
         }
-        yield Surface(f"{task.id} robot", partial(_robot, task.id), named=robot)
-        yield Surface(f"{task.id} vector", partial(_vector, task.id), named=dict.fromkeys(
-            ("num_envs", "num_threads", "max_episode_steps", "autoreset_mode", "reset_options"), ()
-        ))
+        yield Surface(f"{id} robot", ROBOT, partial(_robot, id), named=robot)
+        yield Surface(f"{id} vector", VECTOR, partial(_vector, id), named=vector)
+        said = {
+            "options": _said(task.options.names), "seed": ([0, None], [1]), "actions": _full(2, n),
+        }
+        yield Surface(f"{id} vector reset and step", VECTOR, partial(_together, id), named=said,
+                      errors=_errors(TaskVector.reset))  # fmt: skip
+
+
+def _of_files() -> Iterator[Surface]:
+    for name in READERS:
+        yield Surface(name, FILE, partial(_read, name), errors=frozenset({"SimulationDiverged"}),
+                      named={"content": damages()})  # fmt: skip
+
+
+def _read(name: str, content: Any = None) -> Any:
+    return None if content is None else spoilt(name, content)
+
+
+def _full(*shape: int) -> tuple[Any, ...]:
+    """Actions: some that are, and some out of bounds or shape."""
+    values = (-1.1, -1.0, 0.3, 1.0, np.nan)
+    others = np.zeros((*shape, 1)), np.zeros(shape[1:])
+    return (*(np.full(shape, value) for value in values), *others)
+
+
+def _said(names: Sequence[str]) -> tuple[Any, ...]:
+    """Options of two tasks: for both, for each, for one of them, and wrong ones."""
+    mask = np.array([True, False])
+    wrong = mask.astype(float), [True, False], mask[:1], 1
+    each = [{name: value} for name in names for value in (math.nan, "x", 0.1)]
+    masks = [{"reset_mask": m} for m in (mask, ~mask, *wrong)]
+    return (*each, *masks, [{}, None], [{}], [None, 1], [{"nothing": 1.0}, {}])
 
 
 def _near(low: float, high: float) -> tuple[float, ...]:
@@ -209,6 +231,13 @@ def _task(id: str) -> Any:
     return tca_mj.make(id).unwrapped
 
 
+@cache
+def _two(id: str) -> Any:
+    tasks = TaskVector(task_class(id), num_envs=2, **task_spec(id).kwargs)
+    tasks.reset(seed=0)
+    return tasks
+
+
 def _constructed(id: str, **arguments: Any) -> None:
     task_class(id)(**task_spec(id).kwargs | arguments)
 
@@ -228,10 +257,10 @@ def _first_step(task: Any, begun: Any) -> Any:
     return begun, outcome
 
 
-def _acted(id: str, action: Any) -> Any:
+def _acted(id: str, **said: Any) -> Any:
     task = _task(id)
     task.reset(seed=0)
-    outcome = task.step(action)
+    outcome = task.step(said.get("action", task.action.still))
     assert task.observation_space.contains(outcome[0]), task.observation.outside(outcome[0])
     return outcome
 
@@ -246,6 +275,15 @@ def _robot(id: str, **design: Any) -> Any:
 
 def _vector(id: str, **arguments: Any) -> None:
     TaskVector(task_class(id), **task_spec(id).kwargs, **arguments)
+
+
+def _together(id: str, **said: Any) -> Any:
+    tasks = _two(id)
+    begun = tasks.reset(seed=said.get("seed", 0), options=said.get("options"))
+    outcome = tasks.step(said.get("actions", np.stack([_task(id).action.still] * 2)))
+    for seen in (begun[0], outcome[0]):
+        assert tasks.observation_space.contains(seen), seen
+    return begun, outcome
 
 
 def _closed(name: str) -> bool:
@@ -265,15 +303,15 @@ def _of_class(name: str, kind: Any) -> Iterator[Surface]:
     if hasattr(kind, "robot_argument"):  # a task: walked by the registry
         return
     if not (inspect.isabstract(kind) or is_value(kind)):
-        yield Surface(name, kind, errors=_errors(kind) | _errors(kind.__init__))
+        yield Surface(name, CONSTRUCTOR, kind, errors=_errors(kind) | _errors(kind.__init__))
     for key, member in vars(kind).items():
         if (key.startswith("_") and key != "__call__") or f"{name}.{key}" in NO_DOOR:
             continue
         if isinstance(member, classmethod | staticmethod):
             bound = getattr(kind, key)
-            yield Surface(f"{name}.{key}", bound, errors=_errors(bound))
+            yield Surface(f"{name}.{key}", FUNCTION, bound, errors=_errors(bound))
         elif inspect.isfunction(member):
-            yield Surface(f"{name}.{key}", member, owner=kind, errors=_errors(member))
+            yield Surface(f"{name}.{key}", METHOD, member, owner=kind, errors=_errors(member))
 
 
 def _errors(function: Any) -> frozenset[str]:
@@ -282,438 +320,10 @@ def _errors(function: Any) -> frozenset[str]:
     return frozenset(re.findall(r"\b[A-Z]\w+(?=[,:])", said.group(1))) if said else frozenset()
 
 
-_TASK = "TCA/BendReach-v0"
-
-
-def _spiral(t: Any) -> Any:
-    return 0.01 * np.stack([np.cos(t), np.sin(t), 0.1 * t], axis=-1)
-
-
-def _shipped(name: str) -> Path:
-    from tca_mj.agents.policies import shipped
-
-    return shipped()[name]
-
-
-def _setup() -> dict[str, Any]:
-    setup: dict[str, Any] = _env(_TASK).unwrapped.options.setup(np.random.default_rng(0), {})
-    return setup
-
-
-@cache
-def _recorded() -> Path:
-    from tca_mj.record import Recorder
-
-    path = Path("good.rrd").absolute()
-    with Recorder(good(tca_mj.Simulation), path) as recorder:
-        recorder.frame()
-    return path
-
-
-@cache
-def _statistics() -> Path:
-    path = Path("statistics.npz").absolute()
-    np.savez(path, mean=np.zeros(3), var=np.ones(3), clip=10.0, epsilon=1e-8)
-    return path
-
-
-@cache
-def _exported() -> tuple[Any, Any]:
-    part = bending_module()
-    return tca_mj.Simulation(part), part.spec
-
-
-# What an argument is where its annotation does not say: by parameter, in SI units.
-BY_NAME: dict[str, Any] = {
-    "length": 0.045, "temperature": 60.0, "dt": 0.02, "tension": 0.1, "radius": 4e-3,
-    "count": 3, "phase": 0.5, "s": 0.5, "angle": 0.5, "time": 1.0, "force": 0.05, "mass": 0.03,
-    "diameter": 9e-3, "outer_diameter": 9e-3, "young": 1e5, "shear": 4e4, "density": 1000.0,
-    "body_length": 0.045, "half_width": 1e-3, "offset": 4e-3, "turns": 2.0, "voltage": 1.0,
-    "resistance": 3.0, "power": 0.5, "surface": 60.0, "ambient": 25.0, "speed": 1.0,
-    "hot": 120.0, "cold": 25.0, "nodes": 4, "rest_length": 0.05, "pitch_angle": 0.3,
-    "displacement": 0.01, "load": 0.1, "target": 60.0, "weight": 0.1, "tension_rate": 0.01,
-    "name": "tca9", "width": 5e-3, "height": 5e-3, "inner": 6e-4, "outer": 2e-3, "duration": 0.02,
-    "start": 80.0, "seed": 1, "modulus": 1e8, "excess_ratio": 2.0, "cooling": True,
-    "bending_rate": 0.0, "memory": 0.1, "error": 0.1, "duty": 0.5, "periods": 3.0, "stiff": 0.1,
-    "passes": lambda: route_passes(_samples()[Chain](), good(tca_mj.Helix)),
-    "torsion_per_tension": 200.0, "section": 3e-5, "perimeter": 0.02, "cycles": 2,
-}  # fmt: skip
-# Words by which messages call parameters.
-SAID_AS = {"given": "options", "temperatures": "temperature", "drives": "drive", "value": "x"}
-# The same for single surfaces.
-BY_SURFACE: dict[str, dict[str, Any]] = {
-    "rod.beam.Outline": {"half_width": 4e-3, "half_height": 4e-3},
-    "control.gait.Gait": {
-        "offset": (0.0, 0.5), "start": (0.0, 0.5), "duty": (0.5, 0.5), "hot": (150.0, 150.0),
-        "warm": (40.0, 40.0), "period": 3.0,
-    },
-    "control.gait.Gait.table": {"name": "hot"},
-    "model.part.Part.attach": {"to": "tip", "prefix": "more", "names": None},
-    "model.scene.load": {"path": lambda: mjcf("arena.xml")},
-    "model.scene.scene": {"arena": lambda: mjcf("arena.xml")},
-    "record.plots.rollout_plot": {
-        "time": [0.0, 1.0], "bend": [0.0, 1.0], "names": ["a"],
-        **{name: [[1.0], [2.0]] for name in ("power", "temperature", "tension")},
-        "path": "plot.png",
-    },
-    "record.reader.read": {"path": lambda: _recorded()},
-    "sim.Simulation.bend": {"chains": "body"},
-    "sim.Simulation.keep": {"temperature": [60.0] * 3},
-    "sim.Simulation.rest": {"temperature": [30.0] * 3},
-    "sim.Simulation.group": {"kind": "TCA"},
-    "sim.Simulation.step": {"command": [0.1] * 3},
-    "sim.Simulation.checked": {"command": [0.1] * 3, "voltage": 0.0, "fan": False},
-    "smp.heater.fan_gain": {"start": 120.0},
-    "smp.heater.HeaterSpec.losing": {"fan": True}, "smp.heater.heat_spine": {"fan": True},
-    "smp.bank.SpineBank": {"owner": [0]},
-    "rod.shape.bend": {"axes": [[0.0, 0.0, 1.0], [0.0, 0.1, 0.995]]},
-    "variation.Variation.bounds": {"name": "mass"},
-    "record.render.colour_tendons": {"tendon": [0], "temperature": [60.0]},
-    "model.spine.sheath": {"**": lambda: {
-        "length": 0.1, "line_density": 0.03, "outline": good(rod.Outline),
-    }},
-    "routes.Helix.between": {"start": 0.0, "end": 0.5},
-    "routes.leg_length": {"leg": lambda: good(tca_mj.Helix)},
-    "model.mujoco_warnings.warning_line": {"counts": lambda: Counter({"x": 1})},
-    "tca.fibre.centreline.Centreline.of_curve": {
-        "position": lambda: _spiral, "end": 6.0, "start": 0.0,
-    },
-    "tca.fibre.centreline.Centreline.of_points": {"points": lambda: _spiral(np.linspace(0, 6, 50))},
-    "tca.laws.creep.CreepBank.fresh": {"length": [0.05]},
-    "tca.sensing.wire.fit_displacement": {
-        "resistance": [3.0, 3.1, 3.2, 3.3, 3.4], "displacement": [0.0, 1e-3, 2e-3, 3e-3, 4e-3],
-    },
-    "tca.spec.TcaSpec": {
-        "minimum_pitch_angle": 0.2, "fibre_length": 0.175, "coil_radius": 0.43e-3,
-    },
-    "tca.spec.TcaSpec.from_mandrel": {
-        "core_diameter": 4e-4, "fibre_length": 0.175, "groove_pitch_angle": 0.35,
-    },
-    "tca.mandrel.kept_share": {"groove_pitch_angle": 0.35, "annealing_temperature": 180.0},
-    "tca.supply.Supply.checked": {"n": 1},
-    "variation.Nominal.apply": {"variation": lambda: variation.Variation()},
-    "rod.beam.Outline.contains": {"x": 1e-3, "y": 1e-3},
-    "agents.episode.Episode": {"names": (_TASK, "off"), "out": None, "options": {}, "seed": 1},
-    "agents.episode.Episode.run": {"limit": 0.2, "speed": 1.0, "progress": False},
-    "agents.evaluate.cell": {"name": "return"}, "agents.evaluate.label": {"name": "return"},
-    "agents.evaluate.figures": {"rows": [{"return": 1.0}]},
-    "agents.policies.files.SavedPolicy.to_onnx": {"path": "network.onnx"},
-    "agents.policies.load.saved_policy": {"source": "bend-reach"},
-    "agents.policies.preprocessing.Statistics.read": {"path": lambda: _statistics()},
-    "agents.policies.sb3_zip.Model.preprocessed": {"statistics": None, "units": None},
-    "assets.mjcf": {"name": "arena.xml"},
-    "envs.hanging.hang": {"place": (0.0, 0.0, 0.1), "turn": (1.0, 0.0, 0.0, 0.0),
-                          "stand": "reach_stand"},
-    "exported.frozen": {"sim": lambda: _exported()[0], "spec": lambda: _exported()[1]},
-    "agents.policies.actors.scripted": {"env": lambda: _env(_TASK, action="power")},
-    "agents.policies.load.load_policy": {
-        "source": "bend-reach", "env": lambda: _env(_TASK, action="power"),
-    },
-    "agents.policies.load.require_arguments": {"arguments": {}},
-    "agents.policies.gait.GaitPolicy.in_task": {
-        "env": lambda: _env("TCA/TetrapodWalk-v0", action="power"), "steering": 0.0,
-    },
-    "agents.scripts.arm.scripted": {"task": lambda: _env("TCA/ArmPickPlace-v0").unwrapped},
-    "agents.scripts.morph.scripted": {"task": lambda: _env("TCA/MorphModule-v0").unwrapped},
-    "agents.scripts.tetrapod.scripted": {"task": lambda: _env("TCA/TetrapodWalk-v0").unwrapped},
-    "agents.scripts.reach.scripted": {"task": lambda: _env(_TASK).unwrapped},
-    "control.morph.ClosedLoop": {
-        "pi": lambda: control.PiSpec(proportional=1.0, highest=2.0),
-        "angle_of": lambda: math.sqrt,
-    },
-    "agents.policies.network.Network": {
-        "weights": lambda: (np.ones((1, 2), np.float32),), "mean": lambda: np.zeros(2),
-        "biases": lambda: (np.zeros(1, np.float32),), "var": lambda: np.ones(2),
-    },
-    "agents.policies.files.SavedPolicy.make": {"env": lambda: _env(_TASK, action="power")},
-    "envs.table.numbers": {"value": [0.5], "shape": (1,)},
-    "envs.options.Option.checked": {"value": 0.5},
-    "envs.options.Option": {"**": lambda: {"draw": lambda random, setup: 0.5}},
-    "envs.options.Options.setup": {"given": {}},
-    "tca.fibre.centreline.Centreline": {
-        "strain": lambda: lambda s: np.zeros((*np.shape(s), 3)), "rotation": lambda: np.eye(3),
-        "position": (0.0, 0.0, 0.0),
-    },
-    "record.film.Film": {"path": "film.mp4"},
-    "record.recorder.Recorder": {"path": "made.rrd"},
-    "variation.Variation.drawn": {"draws": [0.1] * 5, "spread": 0.2},
-    "envs.hanging.StaticTip.at": {"temperature": [60.0, 30.0, 30.0]},
-    "envs.hanging.StaticTip.inverse": {"target": [5e-3, 0.0, -0.044], "hottest": 100.0},
-    "envs.table.Entry": {"low": 0.0, "high": 1.0},
-    "envs.table.Table.pack": {"values": lambda: _samples()[SimulatedTask]().observe()},
-    "envs.options.variation_of": {"setup": lambda: _setup()},
-    "agents.design.robot_of": {"task": _TASK, "design": lambda: {"length": 0.05}},
-    "agents.design.designed": {"spec": lambda: tca_mj.BendingSpec(), "design": {}},
-    "agents.demo.play": {"task": _TASK, "max_duration": 0.2, "policy": "off", "video": False},
-    "agents.evaluate.Evaluation": {"task": _TASK},
-    "agents.evaluate.run_episode": {"seed": 1},
-    "agents.policies.actors.arguments_of": {"name": "off", "task": _TASK},
-    "agents.policies.actors.best_of": {"name": "off"},
-    "agents.policies.actors.actor": {"name": "off"},
-    "agents.policies.actors.first_gait": {"task": "TCA/TetrapodWalk-v0", "start": "scripted"},
-    "agents.policies.files.SavedPolicy": {
-        "task": _TASK, "**": lambda: {"network": good(Network)},
-    },
-    "agents.policies.files.SavedPolicy.save": {"path": "saved.npz"},
-    "agents.policies.files.SavedPolicy.read": {"path": lambda: _shipped("bend-reach")},
-    "agents.policies.load.find": {"source": "bend-reach"},
-    "agents.scripts.tetrapod.gait_policy": {"gait": "walk"},
-    "agents.sweep.Sweep": {"axes": {"seed": [1, 2]}},
-    "agents.train.config.TrainConfig": {
-        "task": _TASK, "algorithm": "sac", "learner": lambda: _samples()[OffPolicy](),
-    },
-    "agents.train.config.default_config": {"task": _TASK, "algorithm": "sac"},
-    "agents.train.search.SearchConfig": {"task": "TCA/TetrapodWalk-v0"},
-    "agents.train.gait_space.GaitSpace": {"hottest": 172.0},
-    "agents.train.gait_space.GaitSpace.encode": {"steering": (0.0,) * 4},
-    "agents.train.gait_space.GaitSpace.decode": {"point": [0.5] * 28},
-    "agents.train.gait_space.GaitSpace.fold": {"point": [0.5] * 28},
-    "registry.make": {"task": _TASK}, "registry.find_task": {"task": _TASK},
-    "registry.task_class": {"task": _TASK}, "registry.episode_steps": {"task": _TASK},
-}  # fmt: skip
-
-
-def good(hint: Any, name: str = "", surface: str = "") -> Any:
-    """Something that an argument can be.
-
-    Raises:
-        NoSample: If nothing is known.
-    """
-    special = BY_SURFACE.get(surface, {})
-    if name in special:
-        return _made(special[name])
-    origin, inner = get_origin(hint), get_args(hint)
-    samples = _samples()
-    if isinstance(hint, typing.Hashable) and hint in samples:
-        return samples[hint]()
-    for kind in (origin, inner[0] if origin is Annotated else None):
-        if isinstance(kind, type) and kind in samples:
-            return samples[kind]()
-    if hint is bool:
-        return True
-    if hint in (ArrayLike, checks.Array) or hint == checks.Numbers:
-        return np.array([BY_NAME.get(name, 0.5)])
-    if origin is np.ndarray:
-        return np.array([BY_NAME.get(name, 0.5)])
-    if (name in BY_NAME and hint is not str) or name == "name":
-        return _made(BY_NAME[name])
-    if origin is Annotated:
-        return _bounded(hint)
-    if origin is Literal:
-        return inner[0]
-    if origin in (Union, UnionType):
-        return _first(inner, name)
-    if origin is tuple:
-        return tuple(good(each, name) for each in inner if each is not Ellipsis)
-    if origin in (Sequence, list):
-        return [good(inner[0], name)]
-    if origin in (Mapping, dict):
-        return {}
-    if inspect.isclass(hint) and is_dataclass(hint):
-        return hint(**_needed(hint, surface))
-    plain = {float: 1.0, int: 2, str: "x", bytes: b"x"}
-    if hint in plain:
-        return plain[hint]
-    raise NoSample(f"{surface}: {name}: {hint}")
-
-
-def _made(value: Any) -> Any:
-    return value() if inspect.isfunction(value) else value
-
-
-def _needed(kind: Any, surface: str = "") -> dict[str, Any]:
-    parameters = _parameters(kind).items()
-    return {n: good(h, n, surface) for n, (h, d) in parameters if d is inspect.Parameter.empty}
-
-
-def _bounded(hint: Any) -> Any:
-    inner, *checkers = get_args(hint)
-    bounds: dict[str, float] = {}
-    for checker in checkers:
-        bounds |= getattr(checker, "keywords", {})
-    low = bounds.get("above", bounds.get("at_least"))
-    high = bounds.get("below", bounds.get("at_most"))
-    whole = inner is int
-    if low is None and high is None:
-        value: Any = 1.0
-    elif low is None or high is None:
-        value = (low + 1.0) if high is None else high - 1.0
-    else:
-        value = math.sqrt(low * high) if low > 0.0 else low + 0.1 * (high - low)
-    value = max(int(value), bounds.get("at_least", 0)) if whole else float(value)
-    shape = bounds.get("shape")
-    return (value,) * shape[0] if shape else value
-
-
-def _first(members: Sequence[Any], name: str) -> Any:
-    for member in members:
-        try:
-            if member is not NoneType:
-                return good(member, name)
-        except NoSample:
-            continue
-    if NoneType in members:
-        return None
-    raise NoSample(f"{name}: {members}")
-
-
-@cache
-def _samples() -> dict[Any, Callable[[], Any]]:
-    from tca_mj import actuation, smp, tca
-    from tca_mj.agents.episode import Episode
-    from tca_mj.agents.evaluate import Evaluation
-    from tca_mj.agents.policies import Policy, SavedPolicy, shipped
-    from tca_mj.agents.policies.actors import Script, actor
-    from tca_mj.agents.scripts.tetrapod import WALK
-    from tca_mj.agents.train.config import TrainConfig
-    from tca_mj.batch import SimulationBatch
-    from tca_mj.envs.hanging import StaticTip
-    from tca_mj.envs.options import Constant, Option, Options
-    from tca_mj.envs.table import Entry, Table
-    from tca_mj.model.chain import add_chain
-    from tca_mj.model.part import Part, new_spec
-    from tca_mj.model.tendon import Pass, RoutedTca
-    from tca_mj.modules.bending import silicone_cylinder
-    from tca_mj.record.film import Film
-    from tca_mj.record.recorder import Recorded, Recorder
-    from tca_mj.record.render import Closing, Watched
-    from tca_mj.rod import BeamSpec, Outline, Segment
-    from tca_mj.routes import Helix, Route, UTurn
-    from tca_mj.sim import Drive, Simulation
-    from tca_mj.smp.lumped import LumpedModule
-    from tca_mj.state import SimulationState, get_state
-
-    fibre = tca.CATALOGUE["free-stroke"]
-    bank = cache(lambda: tca.TcaBank([fibre]))
-    creeping = cache(lambda: tca.CreepBank([fibre]))
-    lifting = cache(lambda: tca.LoadedTcas([fibre], tca.Load.weight(0.03)))
-    heater = smp.HeaterSpec.fitted(smp.SpineSpec())
-    spines = cache(lambda: smp.SpineBank([smp.SpineSpec()], [heater], [0]))
-    lumped = cache(lambda: LumpedModule(smp.SpineSpec(), heater, fibre.of_length(0.23)))
-    simulated = cache(lambda: Simulation(bending_module()))
-    beam = silicone_cylinder(0.045, 9e-3, 9e-3)
-
-    def chain() -> Chain:
-        spec = new_spec("fuzzed")
-        return add_chain(spec.worldbody, beam, nodes=4, name="body")
-
-    def bent() -> Simulation:
-        simulated().reset()
-        return simulated()
-
-    def env() -> Any:
-        made = _env("TCA/BendReach-v0")
-        made.reset(seed=0)
-        return made
-
-    def loop() -> control.ClosedLoop:
-        return control.ClosedLoop(
-            pi=control.PiSpec(proportional=1.0, highest=2.0), angle_of=lambda ohms: 0.1
-        )
-
-    muscles = [fibre]
-    return {
-        tca.TcaSpec: lambda: fibre, tca.FibreSpec: lambda: fibre.fibre,
-        tca.FibreSpec | tca.FibreTable: lambda: fibre.fibre,
-        tca.TcaBank: bank, tca.TcaState: lambda: bank().rest(),
-        tca.Pull: lambda: bank().pull(bank().rest(), [0.045]),
-        tca.CreepBank: creeping, tca.CreepState: lambda: creeping().rest(),
-        tca.LoadedTcas: lifting, tca.LoadState: lambda: lifting().rest(),
-        tca.Load: lambda: tca.Load.weight(0.03), tca.Heating: lambda: tca.Heating(value=0.5),
-        tca.WireTable: lambda: tca.WireTable.of(muscles),
-        tca.FibreTable: lambda: tca.FibreTable.of([fibre.fibre]),
-        tca.CoilRods: lambda: tca.CoilRods(muscles),
-        tca.CoilSurfaces: lambda: tca.CoilSurfaces(muscles),
-        tca.Surface: lambda: tca.calibrate(fibre), tca.ConicalTca: lambda: tca.CONICAL,
-        tca.HeatSpec: lambda: bank().heat, tca.HeatStep: lambda: tca.HeatStep.of(bank().heat, 0.02),
-        tca.Centreline: lambda: tca.Centreline.of_tca(fibre),
-        tca.Thermostat: lambda: tca.Thermostat(heat=bank().heat, max_power=2.0),
-        tca.Supply: tca.Supply,
-        Polynomial: lambda: Polynomial([0.0, 1.0]),
-        np.random.Generator: lambda: np.random.default_rng(0),
-        BeamSpec: lambda: beam, Helix: lambda: Helix(3e-3),
-        UTurn: lambda: UTurn.parallel(3e-3, 1e-3),
-        Route: lambda: Helix(3e-3), Segment: lambda: Segment(beam, [Helix(3e-3)], [0.05]),
-        Part: bending_module, Chain: chain, Pass: lambda: Pass(chain(), Helix(3e-3)),
-        RoutedTca: lambda: bending_module().tcas[0],
-        mujoco.MjSpec: lambda: new_spec("fuzzed"), mujoco.MjsBody: lambda: new_spec("x").worldbody,
-        mujoco.MjModel: lambda: simulated().model, mujoco.MjData: lambda: simulated().data,
-        Simulation: bent, SimulationState: lambda: get_state(bent()),
-        SimulationBatch: lambda: SimulationBatch([bent()]),
-        Drive: lambda: Drive(command=np.zeros(3)),
-        smp.HeaterSpec: lambda: heater, smp.SpineBank: spines,
-        smp.SpinesState: lambda: spines().rest([0.1]),
-        smp.HeaterState: lambda: smp.HeaterState.rest(heater, (1,)),
-        smp.SpineState: lambda: smp.SpineState.rest(smp.SmpSpec(), np.array([0.1])),
-        LumpedModule: lumped, control.PiState: control.pi_rest,
-        control.Gait: lambda: WALK, control.ClosedLoop: loop,
-        control.MorphSequence: lambda: control.MorphSequence(drive=loop()),
-        control.MorphState: lambda: control.MorphState(control.Phase.SOFTEN, 0.5),
-        control.Phase: lambda: control.Phase.SOFTEN,
-        control.Measurement: lambda: control.Measurement(25.0, 15.0),
-        actuation.MuscleBank: bank,
-        gym.Env: env, SimulatedTask: lambda: env().unwrapped,
-        Table: lambda: env().unwrapped.observation,
-        Entry: lambda: Entry("x", 1, 0.0, 1.0, "-"), StaticTip: lambda: env().unwrapped.static,
-        SavedPolicy: lambda: SavedPolicy.read(next(iter(shipped().values()))),
-        Evaluation: lambda: Evaluation(task="TCA/BendReach-v0", policy="off", episodes=1, steps=1),
-        TrainConfig: lambda: TrainConfig(
-            task="TCA/BendReach-v0", algorithm="sac", learner=OffPolicy(), steps=2
-        ),
-        OffPolicy: OffPolicy, variation.Nominal: lambda: variation.Nominal(bent()),
-        smp.Damage: lambda: smp.Damage(*[np.zeros(1, bool)] * 3),
-        Outline: lambda: Outline(4e-3, 4e-3),
-        Episode: lambda: Episode(
-            env(), actor("off", env()), names=(_TASK, "off"), seed=1, out=None, options={}
-        ),
-        Policy: lambda: actor("off", env()), Script: lambda: Script(act=lambda seen: seen),
-        Constant: lambda: Constant(0.5),
-        Option: lambda: Option(
-            name="x", about="", draw=lambda *_: 0.5, drawn="", low=0.0, high=1.0
-        ),
-        Options: lambda: env().unwrapped.options, Watched: bent, Recorded: bent,
-        Recorder: lambda: Recorder(bent(), "sample.rrd"), Film: lambda: Film(bent(), "sample.mp4"),
-        Closing: lambda: Film(bent(), "sample.mp4"),
-        Network: lambda: SavedPolicy.read(_shipped("bend-reach")).network,
-        Path: lambda: Path("fuzzed"), str | Path: lambda: "fuzzed",
-    }  # fmt: skip
-
-
-
-
-@cache
-def _env(id: str, **arguments: Any) -> Any:
-    made = tca_mj.make(id, **arguments)
-    made.reset(seed=0)
-    return made
-
-
-HOSTILE: dict[str, Callable[[], Any]] = {
-    "nan": lambda: math.nan, "inf": lambda: math.inf, "-inf": lambda: -math.inf,
-    "-0.0": lambda: -0.0, "0": lambda: 0, "-1": lambda: -1, "tiny": lambda: 5e-324,
-    "1e-9": lambda: 1e-9, "1e30": lambda: 1e30, "1e308": lambda: 1e308, "-1e308": lambda: -1e308,
-    "400 digits": lambda: 10**400, "-400 digits": lambda: -(10**400),
-    "5000 digits": lambda: 10**5000, "2**63": lambda: 2**63, "1e6": lambda: 10**6,
-    "1.5": lambda: 1.5, "64.5": lambda: 64.5, "text": lambda: "x", "number as text": lambda: "0.05",
-    "no text": lambda: "", "complex": lambda: 1j, "complex array": lambda: np.array([1.0 + 0j]),
-    "None": lambda: None, "true": lambda: True, "bytes": lambda: b"1", "object": object,
-    "date": lambda: datetime.date(2020, 1, 1), "numpy date": lambda: np.datetime64("2020-01-01"),
-    "no list": list, "no tuple": tuple, "no dict": dict, "no array": lambda: np.array([]),
-    "masked": lambda: np.ma.masked_array([0.05], mask=[True]),
-    "part masked": lambda: np.ma.masked_array([0.05, 0.06, 0.07], mask=[False, True, False]),
-    "nan array": lambda: np.array([math.nan]), "wrong shape": lambda: np.full((2, 3, 4), 0.05),
-    "many axes": lambda: np.full((1,) * 12, 0.05), "ragged": lambda: [[0.05], [0.05, 0.06]],
-    "texts": lambda: ["x", "y"], "objects": lambda: np.array([None, "x"], dtype=object),
-    "set": lambda: {0.05}, "mixed": lambda: [0.05, "x"], "function": lambda: len,
-    "class": lambda: int,
-    "a TCA": lambda: good(tca_mj.TcaSpec), "a beam": lambda: good(tca_mj.BeamSpec),
-    "a route": lambda: good(tca_mj.Helix), "an arm": lambda: tca_mj.ArmSpec(),
-    "a fibre": lambda: good(tca_mj.TcaSpec).fibre, "path": lambda: Path("nowhere"),
-}  # fmt: skip
-
-
-def hostile(near: Sequence[Any] = ()) -> st.SearchStrategy[Any]:
+def hostile(near: Any = ()) -> st.SearchStrategy[Any]:
     """What an argument may be that nobody has asked for; a text is a name in ``HOSTILE``."""
+    if isinstance(near, st.SearchStrategy):
+        return near
     numbers = st.floats() | st.floats(-10.0, 10.0) | st.integers() | st.integers(-5, 50)
     rows = st.lists(numbers, min_size=1, max_size=5)
     strange = st.sampled_from(sorted(HOSTILE))
@@ -729,23 +339,37 @@ def cases(draw: Any, surface: Surface) -> "Case":
     return Case(surface, {name: draw(hostile(surface.named.get(name, ()))) for name in chosen})
 
 
-def tried(surface: Surface, count: int, turn: int = 0) -> list[tuple[str, str]]:
-    """Cases and complaints: so many, the same ones each time; another turn has others."""
-    found: list[tuple[str, str]] = []
+def each_argument(surface: Surface, turn: int = 0) -> Iterator["Case"]:
+    """A case for each argument, in which it is something strange; another turn has others."""
+    strange = sorted(HOSTILE)
+    for name in surface.parameters:
+        if not isinstance(surface.named.get(name), st.SearchStrategy):
+            start = zlib.crc32(f"{surface.name} {name}".encode())
+            yield Case(surface, {name: strange[(start + turn) % len(strange)]})
+
+
+def tried(surface: Surface, count: int, turn: int = 0) -> list["Outcome"]:
+    """What comes of so many cases, the same ones each time; another turn has others."""
+    found: list[Outcome] = []
 
     @seed(zlib.crc32(f"{surface.name} {turn}".encode()))
     @settings(max_examples=count, phases=[Phase.generate], database=None, deadline=None,
               suppress_health_check=list(HealthCheck))
     @given(cases(surface))
     def one(case: Case) -> None:
-        found.append((case.about, case.complaint()))
+        found.append(case.outcome())
 
     one()
     return found
 
 
-# How a file is refused: by its path, with what is wrong with it.
-_OF_A_FILE = re.compile(r"is no (policy|model)|has no statistics|must be trusted")
+@dataclass(frozen=True)
+class Outcome:
+    """A case in words, whether it was refused, and what is wrong with that; empty if nothing is."""
+
+    case: str
+    refused: bool
+    fault: str = ""
 
 
 @dataclass
@@ -756,15 +380,12 @@ class Case:
     hostile: dict[str, Any] = field(default_factory=dict)
 
     def arguments(self) -> dict[str, Any]:
-        parameters = self.surface.parameters
-        given = dict(_made(BY_SURFACE.get(self.surface.name, {}).get("**", {})))
-        for name, (hint, default) in parameters.items():
+        given = dict(spread_of(self.surface.name))
+        for name, (hint, default) in self.surface.parameters.items():
             needed = default is inspect.Parameter.empty or default is SEVERAL
             if name not in self.hostile and needed:
                 given[name] = good(hint, name, self.surface.name)
-        for name, kind in self.hostile.items():
-            given[name] = HOSTILE[kind]() if isinstance(kind, str) else kind
-        return given
+        return given | {name: hostile_of(kind) for name, kind in self.hostile.items()}
 
     @property
     def about(self) -> str:
@@ -773,8 +394,8 @@ class Case:
                 for name, kind in self.hostile.items()}  # fmt: skip
         return f"{self.surface.name} with {said}"
 
-    def complaint(self) -> str:
-        """What is wrong with what comes of it; empty if nothing is."""
+    def outcome(self) -> Outcome:
+        """What comes of it."""
         arguments = self.arguments()
         try:
             with guarded():
@@ -783,26 +404,39 @@ class Case:
                     result = next(result, None)
                 where = nan_in(result)
         except Hangs:
-            return f"takes longer than {SECONDS} s"
+            return Outcome(self.about, False, f"takes longer than {SECONDS} s")
         except (KeyboardInterrupt, SystemExit):
             raise
         except ValueError as error:
-            return self._style(str(error))
+            return Outcome(self.about, True, self._style(str(error)))
         except BaseException as error:  # of a library in another language, too
             names = {kind.__name__ for kind in type(error).__mro__}
-            return "" if names & self.surface.errors else f"{type(error).__name__}: {error}"[:300]
-        return f"NaN in {where}" if where else ""
+            said = "" if names & self.surface.errors else f"{type(error).__name__}: {error}"[:300]
+            return Outcome(self.about, not said, said)
+        expected = self.surface.name in NAN_MEANS_NONE
+        return Outcome(self.about, False, f"NaN in {where}" if where and not expected else "")
 
     def _style(self, said: str) -> str:
-        """Whether a refusal says what is wrong."""
+        """What a refusal does not say; empty if it says what is wrong."""
+        if len(said) > 1000:
+            return f"ValueError of {len(said)} letters: {said[:200]}"
+        if self.surface.kind == FILE:
+            named = any(word in said for word in _FILES)
+            return "" if named else f"ValueError names no file: {said}"[:300]
         if not ("must" in said and "got" in said or _OF_A_FILE.search(said)):
             return f"ValueError without must and got: {said}"[:300]
         names = [name.rpartition(".")[2] for name in self.surface.parameters]
-        if not any(word in said for name in names for word in (name, SAID_AS.get(name, name))):
+        words = {word for name in names for word in (name, SAID_AS.get(name, name))}
+        kinds = [hostile_of(kind) for kind in self.hostile.values()]
+        derived = any(isinstance(kind, int | float) for kind in kinds)  # what follows from it
+        if not (derived or any(word in said for word in words)):
             return f"ValueError names none of {names}: {said}"[:300]
-        if len(said) > 1000:
-            return f"ValueError of {len(said)} letters: {said[:200]}"
         return ""
+
+
+# How a file is refused: by its path, with what is wrong with it.
+_OF_A_FILE = re.compile(r"is no (policy|model)|has no statistics|must be trusted")
+_FILES = ("spoilt", "path", "source", "part", "run.json", "state.pkl", "result.json")
 
 
 def nan_in(value: Any, where: str = "result", depth: int = 0) -> str:
@@ -830,9 +464,10 @@ def guarded() -> Iterator[None]:
     def late(*_: Any) -> None:
         raise Hangs
 
-    before = signal.signal(signal.SIGALRM, late)
-    signal.alarm(SECONDS)
-    faulthandler.dump_traceback_later(2 * SECONDS, exit=True, file=sys.__stderr__)
+    before = [signal.signal(which, late) for which in (signal.SIGPROF, signal.SIGALRM)]
+    signal.setitimer(signal.ITIMER_PROF, SECONDS)
+    signal.setitimer(signal.ITIMER_REAL, 10 * SECONDS)
+    faulthandler.dump_traceback_later(20 * SECONDS, exit=True, file=sys.__stderr__)
     soft, hard = resource.getrlimit(resource.RLIMIT_AS)
     taken = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
     resource.setrlimit(resource.RLIMIT_AS, (taken + MEMORY, hard))
@@ -843,5 +478,68 @@ def guarded() -> Iterator[None]:
     finally:
         resource.setrlimit(resource.RLIMIT_AS, (soft, hard))
         faulthandler.cancel_dump_traceback_later()
-        signal.alarm(0)
-        signal.signal(signal.SIGALRM, before)
+        signal.setitimer(signal.ITIMER_PROF, 0)
+        signal.setitimer(signal.ITIMER_REAL, 0)
+        for which, handler in zip((signal.SIGPROF, signal.SIGALRM), before, strict=True):
+            signal.signal(which, handler)
+
+
+def main(count: int, folder: Path) -> int:
+    """Tries at least so many cases, a surface and a turn at a time, and prints what came of them.
+
+    What is done is kept in ``cases.jsonl``; what a process did not survive is a fault.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    os.chdir(folder)
+    notes = Path("cases.jsonl")
+    rows = [json.loads(line) for line in notes.read_text().splitlines()] if notes.exists() else []
+    begun = {(row["surface"], row["turn"]) for row in rows}
+    done = sum(len(row.get("outcomes", ())) for row in rows)
+    every = surfaces()
+    with notes.open("a", buffering=1) as file:
+        turn = 0
+        while done < count:
+            for surface in (each for each in every if (each.name, turn) not in begun):
+                about = {"surface": surface.name, "kind": surface.kind, "turn": turn}
+                file.write(json.dumps(about) + "\n")
+                found = [case.outcome() for case in each_argument(surface, turn)]
+                found += tried(surface, PER_TURN[surface.kind], turn)
+                outcomes = [(each.case, each.refused, each.fault) for each in found]
+                file.write(json.dumps(about | {"outcomes": outcomes}) + "\n")
+                done += len(found)
+            turn += 1
+    return report([json.loads(line) for line in notes.read_text().splitlines()])
+
+
+PER_TURN = {FILE: 60, ACTION: 20, VECTOR: 10} | dict.fromkeys(
+    (CONSTRUCTOR, FUNCTION, METHOD, ARGUMENTS, OPTIONS, ROBOT), 8
+)
+
+
+def report(rows: Sequence[dict[str, Any]]) -> int:
+    """Prints faults and the table, and returns the number of faults."""
+    whole = {(row["surface"], row["turn"]): row for row in rows if "outcomes" in row}
+    counts: dict[str, Counter[str]] = {kind: Counter() for kind in PER_TURN}
+    names: dict[str, set[str]] = {kind: set() for kind in PER_TURN}
+    for row in rows:
+        count = counts[row["kind"]]
+        names[row["kind"]].add(row["surface"])
+        if "outcomes" not in row and (row["surface"], row["turn"]) not in whole:
+            print(f"{row['surface']}, turn {row['turn']}: ended the process")
+            count["faults"] += 1
+        for case, refused, fault in row.get("outcomes", ()):
+            count["cases"] += 1
+            count["faults" if fault else "refused" if refused else "accepted"] += 1
+            if fault:
+                print(f"{case}: {fault}")
+    columns = ("cases", "refused", "accepted", "faults")
+    counts["together"] = sum(counts.values(), Counter())
+    names["together"] = set().union(*names.values())
+    lines = [[kind, str(len(names[kind])), *(str(counts[kind][c]) for c in columns)]
+             for kind in counts]  # fmt: skip
+    print("\n".join(table(["what", "of them", *columns], lines)))
+    return counts["together"]["faults"]
+
+
+if __name__ == "__main__":
+    sys.exit(min(1, main(int(sys.argv[1]), Path(sys.argv[2]))))
