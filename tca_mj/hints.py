@@ -14,6 +14,7 @@ from typing import Annotated, Any
 from tca_mj.checks import quantity, shown
 
 _SOFTEST = 100.0  # of gels that still have a shape [Pa]
+_STIFFEST = 1e13  # diamond has 1e12 [Pa]
 
 
 def size(
@@ -45,14 +46,14 @@ def size(
 
 
 def modulus(name: str, value: Any, *, typed: float = 1e6) -> float:
-    """One modulus of elasticity [Pa], not softer than any gel; errors as ``size``.
+    """One modulus of elasticity [Pa], between those of gels and diamond; errors as ``size``.
 
     Args:
         name: What it is, for the message.
         value: The number.
         typed: The unit that is probably meant where it is softer: megapascal, or 1e9 [Pa].
     """
-    found = quantity(name, value, above=0.0)
+    found = quantity(name, value, above=0.0, at_most=_STIFFEST, unit="Pa")
     if found < _SOFTEST:
         meant = _meant([found * typed], _SOFTEST, math.inf, "Pa")
         raise ValueError(

@@ -27,9 +27,11 @@ from tca_mj.agents.policies.network import Network
 from tca_mj.agents.train.config import OffPolicy
 from tca_mj.assets import mjcf
 from tca_mj.envs.task import SimulatedTask
+from tca_mj.envs.vector import TaskVector
 from tca_mj.model.chain import Chain
 from tca_mj.model.tendon import route_passes
 from tca_mj.modules.bending import bending_module
+from tca_mj.registry import task_class
 
 SEVERAL = object()  # what stands for the default of *arguments, of which one is given
 
@@ -233,6 +235,8 @@ BY_SURFACE: dict[str, dict[str, Any]] = {
     },
     "agents.train.config.default_config": {"task": TASK, "algorithm": "sac"},
     "agents.train.search.SearchConfig": {"task": "TCA/TetrapodWalk-v0"},
+    "agents.train.sb3_env.TaskVecEnv.make": {"id": TASK},
+    "envs.wrappers.RecordRerun": {"path": "wrapped.rrd"},
     "agents.train.gait_space.GaitSpace": {"hottest": 172.0},
     "agents.train.gait_space.GaitSpace.encode": {"steering": (0.0,) * 4},
     "agents.train.gait_space.GaitSpace.decode": {"point": [0.5] * 28},
@@ -421,6 +425,7 @@ def _samples() -> dict[Any, Callable[[], Any]]:
         control.Phase: lambda: control.Phase.SOFTEN,
         control.Measurement: lambda: control.Measurement(25.0, 15.0),
         actuation.MuscleBank: bank,
+        TaskVector: lambda: TaskVector(task_class(TASK), num_envs=2),
         gym.Env: env, SimulatedTask: lambda: env().unwrapped,
         Table: lambda: env().unwrapped.observation,
         Entry: lambda: Entry("x", 1, 0.0, 1.0, "-"), StaticTip: lambda: env().unwrapped.static,
@@ -474,7 +479,7 @@ HOSTILE: dict[str, Callable[[], Any]] = {
     "many axes": lambda: np.full((1,) * 12, 0.05), "ragged": lambda: [[0.05], [0.05, 0.06]],
     "texts": lambda: ["x", "y"], "objects": lambda: np.array([None, "x"], dtype=object),
     "set": lambda: {0.05}, "mixed": lambda: [0.05, "x"], "function": lambda: len,
-    "class": lambda: int,
+    "class": lambda: bool,
     "a TCA": lambda: good(tca_mj.TcaSpec), "a beam": lambda: good(tca_mj.BeamSpec),
     "a route": lambda: good(tca_mj.Helix), "an arm": lambda: tca_mj.ArmSpec(),
     "a fibre": lambda: good(tca_mj.TcaSpec).fibre, "path": lambda: Path("nowhere"),

@@ -51,7 +51,7 @@ from tca_mj.registry import find_task as task_spec
 SECONDS = 30  # of computing, longest time of a case; ten times that on the clock
 MEMORY = 6 << 30  # largest memory that a case may take besides [bytes]
 
-# What is no door, and why: modules, and things in them.
+# What is no door, and why: modules, things in them, and with a star all methods in them.
 _PROGRAM = "a program that runs for minutes"
 _KERNEL = "a kernel: arrays of numbers that were checked"
 _SCREEN = "needs a screen"
@@ -80,9 +80,9 @@ NO_DOOR = {
             "agents.policies.network.Network.__call__", "agents.scripts.arm.PickAndPlace.act",
             "agents.scripts.morph.MorphPolicy.act", "agents.scripts.reach.ReachPolicy.act",
             "agents.scripts.course.CourseWalker", "agents.policies.gait.GaitPolicy.told_of",
-            "envs.wrappers", "envs.table.Table.scaled", "envs.table.Table.mirrored",
+            "envs.wrappers.*", "envs.table.Table.scaled", "envs.table.Table.mirrored",
             "envs.table.Table.read", "envs.table.Table.outside", "envs.table.Table.bounded",
-            "envs.task", "envs.vector", "agents.train.sb3_env", "agents.policies.actors.Blind",
+            "envs.task", "envs.vector", "agents.train.sb3_env.*", "agents.policies.actors.Blind",
             "agents.rollout",
         ),
         _ACTS,
@@ -310,7 +310,7 @@ def _of_class(name: str, kind: Any) -> Iterator[Surface]:
         if isinstance(member, classmethod | staticmethod):
             bound = getattr(kind, key)
             yield Surface(f"{name}.{key}", FUNCTION, bound, errors=_errors(bound))
-        elif inspect.isfunction(member):
+        elif inspect.isfunction(member) and f"{name.rpartition('.')[0]}.*" not in NO_DOOR:
             yield Surface(f"{name}.{key}", METHOD, member, owner=kind, errors=_errors(member))
 
 

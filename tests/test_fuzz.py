@@ -100,7 +100,7 @@ def test_what_is_no_door_exists():
     walked = {f"{getattr(thing, '__module__', '')}.{getattr(thing, '__name__', '')}"
               for thing in offered().values()}  # fmt: skip
     known = "\n".join(walked)
-    for name in NO_DOOR:
+    for name in (name.removesuffix(".*") for name in NO_DOOR):
         *_, owner, member = ["", *name.split(".")]
         own = f"tca_mj.{name}" in known
         assert own or any(

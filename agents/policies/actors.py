@@ -100,11 +100,14 @@ def actor(
 
 @door
 def arguments_of(name: str | Path, task: str) -> dict[str, Any]:
-    """Arguments of a task that a policy needs it to be made with; errors as ``actor``.
+    """Arguments of a task that a policy needs it to be made with.
 
     Args:
         name: As for ``actor``; a model of Stable-Baselines3 does not say.
         task: Gymnasium id, or ``module:id``.
+
+    Raises:
+        ValueError, FileNotFoundError: As ``actor``.
     """
     if name == "scripted":
         return dict(task_class(task).scripted_arguments)

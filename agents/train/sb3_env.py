@@ -13,6 +13,7 @@ from stable_baselines3.common.logger import Logger
 from stable_baselines3.common.vec_env import VecEnv
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices, VecEnvStepReturn
 
+from tca_mj.checks import door
 from tca_mj.envs.task import SimulatedTask
 from tca_mj.envs.vector import TaskVector
 from tca_mj.registry import episode_steps, find_task, task_class
@@ -42,12 +43,16 @@ class TaskVecEnv(VecEnv):
         scaled: Whether observations are scaled.
     """
 
+    @door
     def __init__(self, tasks: TaskVector, *, scaled: bool = False) -> None:
         """Takes a vector environment, whose own autoreset is not used.
 
         Args:
             tasks: The vector environment.
             scaled: Whether observations come as ``ScaledObservation`` makes them.
+
+        Raises:
+            ValueError: If an argument is not of its kind.
         """
         self.tasks, self.scaled = tasks, scaled
         table = tasks.envs[0].observation

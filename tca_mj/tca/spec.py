@@ -14,7 +14,17 @@ from dataclasses import dataclass, fields, replace
 from functools import partial
 from typing import Annotated, Literal
 
-from tca_mj.checks import Checked, NotNegative, Positive, Temperature, Triple, door, number, within
+from tca_mj.checks import (
+    Checked,
+    NotNegative,
+    Positive,
+    Temperature,
+    Triple,
+    door,
+    number,
+    quantity,
+    within,
+)
 from tca_mj.hints import angle, modulus, size
 from tca_mj.tca.arrays import column
 from tca_mj.tca.mandrel import BRILL_TRANSITION, kept_share
@@ -22,6 +32,8 @@ from tca_mj.tca.thermal import BodyHeat, HeatSpec
 
 _ABSOLUTE_ZERO = -273.15  # [°C]
 _UPRIGHT = math.pi / 2.0  # pitch of a straight fibre [rad]
+_STRETCH_TO_SHEAR = 0.1, 1000.0  # bounds of E/G, estimates: 2 to 3 if isotropic, nylon to 15
+_STEEPEST = 10.0  # slope of filaments around a fibre; fibres coil by themselves from about 1 on
 
 _Modulus = Annotated[float, partial(modulus, typed=1e9)]
 _LineDensity = Annotated[float, partial(size, kind="fibres", at_most=0.1, unit="kg/m")]
@@ -37,7 +49,8 @@ class FibreSpec(Checked):
     Attributes:
         radius: Radius r_t of the circle that carries load, when cold: the moduli were fitted with
             it (Sun, Table 3.1). Fibre measured across is 0.34 mm thick [m].
-        young: Measured longitudinal Young's modulus E at the reference temperature [Pa].
+        young: Measured longitudinal Young's modulus E at the reference temperature, 0.1 to 1000
+            times ``shear`` [Pa].
         shear: Measured longitudinal shear modulus G at the reference temperature [Pa].
         filament_young: Young's modulus E_f0 of the filament, nylon 6,6 [Pa].
         softening: Fall of E_f per kelvin, Sun, eq. (3.11) [Pa/K].
@@ -46,8 +59,10 @@ class FibreSpec(Checked):
             influence of the load. The other published set, (3.24e-4, -0.027, 1), was
             fitted to three loads of the free-stroke TCA up to 60 g (tau = 171 rad/m) and is
             an extrapolation beyond.
-        inserted_twist: Twist inserted before annealing, per fibre length [rad/m].
-        untwist_scale: Factor on the untwist, 1 unless a coil was fitted with another [1].
+        inserted_twist: Twist inserted before annealing, per fibre length, at most 10 / ``radius``
+            [rad/m].
+        untwist_scale: Factor on the untwist, 1 unless a coil was fitted with another, at most 10
+            [1].
         expansion: Coefficients (c2, c1, c0) of the ratio of hot to cold fibre radius,
             Gamma(T) = c2 T^2 + c1 T + c0 with T in °C, Sun, Section 3.1.2. The constant term
             is the one near 1. The laws divide Gamma by its value at the
@@ -73,7 +88,7 @@ class FibreSpec(Checked):
     softening: float = 0.0011e9
     load_softening: Triple = (0.0, 0.0, 1.0)
     inserted_twist: NotNegative = 4710.0
-    untwist_scale: NotNegative = 1.0
+    untwist_scale: Annotated[float, partial(quantity, at_least=0.0, at_most=10.0)] = 1.0
     expansion: Triple = (3.5e-6, -6.7e-5, 1.0)
     line_density: _LineDensity = 4 * 23.5e-6 * 218.0 / 175.0
     specific_heat: Positive = 1267.0
@@ -85,6 +100,9 @@ class FibreSpec(Checked):
     def __post_init__(self) -> None:
         Checked.__post_init__(self)
         (mu2, mu1, mu0), (c2, c1, c0) = self.load_softening, self.expansion
+        low, high = (share * self.shear for share in _STRETCH_TO_SHEAR)
+        number("young", self.young, at_least=low, at_most=high, unit="Pa")
+        number("inserted_twist", self.inserted_twist, at_most=_STEEPEST / self.radius, unit="rad/m")
         low, high = within("temperature_range", self.temperature_range, shape=(2,),
                            above=_ABSOLUTE_ZERO)  # fmt: skip
         reference = number("reference_temperature", self.reference_temperature)
