@@ -49,7 +49,7 @@ from tca_mj.registry import TASKS, task_class
 from tca_mj.registry import find_task as task_spec
 
 SECONDS = 30  # of computing, longest time of a case; ten times that on the clock
-MEMORY = 6 << 30  # largest memory that a case may take besides [bytes]
+MEMORY = 16 << 30  # address space that a case may take besides [bytes]
 
 # What is no door, and why: modules, things in them, and with a star all methods in them.
 _PROGRAM = "a program that runs for minutes"

@@ -12,7 +12,7 @@ from tca_mj.model.build import add_tca
 from tca_mj.model.chain import Nodes, add_chain
 from tca_mj.model.part import Part, new_spec
 from tca_mj.rod.beam import BeamSpec
-from tca_mj.routes import AnyRoute, TcaCount, parallel
+from tca_mj.routes import Route, TcaCount, parallel
 from tca_mj.tca import CATALOGUE, TcaSpec
 from tca_mj.tca.embedding import SILICONE_DENSITY, in_silicone
 
@@ -37,9 +37,8 @@ def silicone_cylinder(
     )  # fmt: skip
 
 
-@door
 def straight_module(
-    name: str, body: BeamSpec, nodes: Nodes, tca: TcaSpec, routes: Mapping[str, AnyRoute]
+    name: str, body: BeamSpec, nodes: Nodes, tca: TcaSpec, routes: Mapping[str, Route]
 ) -> Part:
     """A soft body with its base at the origin and its axis along z.
 
@@ -56,6 +55,8 @@ def straight_module(
     Raises:
         ValueError: If the geometry cannot be built, or the routes have no names.
     """
+    if not isinstance(routes, Mapping):
+        raise ValueError(f"routes must be routes by the names of their TCAs, got {routes!r}")
     part = Part(new_spec(name), sites={"tip": "tip"})
     chain = add_chain(part.spec.worldbody, body, nodes=nodes, name="body")
     chain.mark_tip("tip")
