@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from fuzz_samples import TASK, good, recorded, shipped_policy, statistics, task_env
+from fuzz_samples import TASK, good, model_zip, recorded, shipped_policy, statistics, task_env
 from hypothesis import strategies as st
 
 import tca_mj
@@ -160,20 +160,6 @@ def _acts(path: Path, env: Any, preprocessing: Any = None) -> Any:
     return action, env.unwrapped.observation_space.shape
 
 
-def _model() -> bytes:
-    from stable_baselines3 import PPO
-
-    from tca_mj.envs.wrappers import ScaledObservation
-
-    scaled = ScaledObservation(task_env(TASK, action="power"))
-    small = {"net_arch": {"pi": [4], "vf": [2]}}
-    model = PPO("MlpPolicy", scaled, policy_kwargs=small, seed=0, device="cpu", n_steps=2,
-                batch_size=2)  # fmt: skip
-    file = io.BytesIO()
-    model.save(file)
-    return file.getvalue()
-
-
 def _onnx() -> bytes:
     policy = SavedPolicy.read(shipped_policy("bend-reach"))
     return policy.to_onnx("whole.onnx").read_bytes()
@@ -243,7 +229,7 @@ READERS: dict[str, Reader] = {
         lambda path: _acts(path, task_env(WALK, action="power")), ".json",
     ),
     "model.zip": Reader(
-        _model,
+        model_zip,
         lambda path: _acts(path, task_env(TASK, action="power"), Preprocessing(scaled=True)),
         ".zip",
     ),

@@ -5,6 +5,7 @@
 
 import datetime
 import inspect
+import io
 import math
 import typing
 from collections import Counter
@@ -66,6 +67,22 @@ def shipped_policy(name: str) -> Path:
     from tca_mj.agents.policies import shipped
 
     return shipped()[name]
+
+
+@cache
+def model_zip() -> bytes:
+    """A model of Stable-Baselines3."""
+    from stable_baselines3 import PPO
+
+    from tca_mj.envs.wrappers import ScaledObservation
+
+    scaled = ScaledObservation(task_env(TASK, action="power"))
+    small = {"net_arch": {"pi": [4], "vf": [2]}}
+    model = PPO("MlpPolicy", scaled, policy_kwargs=small, seed=0, device="cpu", n_steps=2,
+                batch_size=2)  # fmt: skip
+    file = io.BytesIO()
+    model.save(file)
+    return file.getvalue()
 
 
 def _setup() -> dict[str, Any]:
@@ -171,6 +188,7 @@ BY_SURFACE: dict[str, dict[str, Any]] = {
     "agents.policies.files.SavedPolicy.to_onnx": {"path": "network.onnx"},
     "agents.policies.load.saved_policy": {"source": "bend-reach"},
     "agents.policies.preprocessing.Statistics.read": {"path": lambda: statistics()},
+    "agents.policies.sb3_zip.Model.parsed": {"content": lambda: model_zip()},
     "agents.policies.sb3_zip.Model.preprocessed": {"statistics": None, "units": None},
     "assets.mjcf": {"name": "arena.xml"},
     "envs.hanging.hang": {"place": (0.0, 0.0, 0.1), "turn": (1.0, 0.0, 0.0, 0.0),

@@ -101,7 +101,13 @@ class Model:
         Raises:
             ValueError: As ``read``.
         """
-        return _model(content, name)
+        try:
+            with np.errstate(all="ignore"):
+                return _model(content, name)
+        except Exception as error:
+            raise ValueError(
+                f"content must be a model of Stable-Baselines3, got {name:.80}: {why(error)}"
+            ) from error
 
     @door
     def preprocessed(self, units: Floats | None, statistics: Statistics | None) -> Network:
