@@ -10,11 +10,16 @@ from typing import Any
 
 import gymnasium as gym
 
+from tca_mj.checks import door, shown
+
+Contract = Mapping[str, Mapping[str, Any]]
+"""What a policy can rely on, part by part: rows, timing and figures by name."""
 ROBOT = "robot"
 """The part of a contract that a policy can do without, at its own risk."""
 _SHOWN = 4  # differences that a message names
 
 
+@door
 def contract(env: gym.Env[Any, Any]) -> dict[str, Any]:
     """What a policy can rely on in an environment.
 
@@ -25,6 +30,9 @@ def contract(env: gym.Env[Any, Any]) -> dict[str, Any]:
         ``observation`` and ``action``: for each row its name, size, unit, centre and scale;
         ``timing``: the control period [s], and what the TCAs are told; ``robot``: every figure of
         the specification by its path, empty where there is none.
+
+    Raises:
+        ValueError: If an argument is not of its kind.
     """
     task: Any = env.unwrapped
     argument = None if task.robot_argument is None else task.robot_argument[0]
@@ -44,22 +52,30 @@ def contract(env: gym.Env[Any, Any]) -> dict[str, Any]:
     return plain
 
 
-def digest(made_for: Mapping[str, Any]) -> str:
+@door
+def digest(made_for: Contract) -> str:
     """A contract in 16 letters.
 
     Args:
         made_for: The contract.
+
+    Raises:
+        ValueError: If an argument is not of its kind.
     """
     text = json.dumps(made_for, sort_keys=True)
     return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 
-def differences(needed: Mapping[str, Any], given: Mapping[str, Any]) -> list[str]:
+@door
+def differences(needed: Contract, given: Contract) -> list[str]:
     """Where two contracts differ, in words, part by part.
 
     Args:
         needed: What a policy was made for.
         given: What an environment has.
+
+    Raises:
+        ValueError: If an argument is not of its kind.
     """
     found = []
     for part in needed:
@@ -79,7 +95,7 @@ def differences(needed: Mapping[str, Any], given: Mapping[str, Any]) -> list[str
 
 
 def _said(rows: Mapping[str, Any], name: str) -> str:
-    return repr(rows[name]) if name in rows else "missing"
+    return shown(rows[name]) if name in rows else "missing"
 
 
 def _flat(path: str, value: Any) -> Iterator[tuple[str, Any]]:
