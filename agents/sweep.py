@@ -266,7 +266,7 @@ def _result(file: Path, point: Mapping[str, Value]) -> dict[str, Any]:
         ValueError: If the file is broken.
     """
     found = read_json(file)
-    figures = found.get("figures")
+    figures: Any = found.get("figures")
     try:
         require_one_of("point", found.get("point"), [dict(point)])
         instance("figures", figures, dict)
