@@ -1,5 +1,5 @@
 from tca_mj.envs.arm import ArmPickPlace, ArmPickPlaceVector
-from tca_mj.envs.command import Command, Following
+from tca_mj.envs.command import Command, Following, Retelling
 from tca_mj.envs.course import Places, TetrapodCourse, TetrapodCourseVector
 from tca_mj.envs.hanging import NoRest, StaticTip, hang
 from tca_mj.envs.morph import MorphModule, MorphModuleVector, hanging_module
@@ -16,7 +16,7 @@ from tca_mj.envs.wrappers import RecordRerun, ScaledObservation, VectorScaledObs
 __all__ = [
     "ArmPickPlace", "ArmPickPlaceVector", "BendReach", "BendReachVector", "Command", "Constant",
     "Entry", "Following", "GaitTask", "HEATINGS", "Headway", "MorphModule", "MorphModuleVector",
-    "NoDisplay", "NoRest", "Option", "Options", "Places", "Recipe", "RecordRerun",
+    "NoDisplay", "NoRest", "Option", "Options", "Places", "Recipe", "Retelling", "RecordRerun",
     "ScaledObservation", "SimulatedTask", "StaticTip", "Table", "TaskArguments", "TaskState",
     "TaskVector", "TetrapodCourse", "TetrapodCourseVector", "TetrapodGait", "TetrapodGaitVector",
     "Uniform", "VectorScaledObservation", "Verdict", "ViewerEnvironment", "ViewerPolicy", "hang",
