@@ -288,14 +288,52 @@ def test_progress_is_told_without_a_terminal(tmp_path, capsys, monkeypatch):
         assert "return=" in lines[2] and not any("\r" in line for line in lines)
 
 
-def test_nobody_is_left_to_read():
-    """As ``tca-mj list | head``: no error, and the code that a shell knows."""
-    run = subprocess.Popen([sys.executable, "-m", "tca_mj.cli", "list"], stdout=subprocess.PIPE,
-                           stderr=subprocess.PIPE)  # fmt: skip
-    assert run.stdout and run.stderr
-    run.stdout.close()
-    assert run.stderr.read() == b"" and run.wait() == 141
-    run.stderr.close()
+EVAL = ["eval", "off", "--task", REACH, "--episodes", "1", "--steps", "2", "--out", "out"]
+BUFFERED = {k: v for k, v in os.environ.items() if k != "PYTHONUNBUFFERED"}
+
+
+@unix
+@pytest.mark.parametrize("words", [["list", REACH], ["--help"], EVAL], ids=" ".join)
+def test_nobody_is_left_to_read(words, tmp_path):
+    """As ``tca-mj list | head``: no error, and the code that a shell knows; so of both streams."""
+    for both in (False, True):
+        run = subprocess.Popen(
+            [sys.executable, "-m", "tca_mj.cli", *words], cwd=tmp_path, env=BUFFERED,
+            stdout=subprocess.PIPE, stderr=subprocess.STDOUT if both else subprocess.PIPE,
+        )  # fmt: skip
+        assert run.stdout
+        run.stdout.close()
+        if run.stderr:
+            said = run.stderr.read().decode()
+            assert "pipe" not in said.lower() and "Traceback" not in said
+            run.stderr.close()
+        assert run.wait() == 141
+
+
+@unix
+@pytest.mark.parametrize("words", ["list", "--help"])
+def test_head_has_the_first_line(words, tmp_path):
+    """By a shell: 0 if all was written before ``head`` had seen enough."""
+    script = f"{sys.executable} -m tca_mj.cli {words} | head -1; echo ${{PIPESTATUS[0]}}"
+    done = subprocess.run(["bash", "-c", script], cwd=tmp_path, env=BUFFERED, capture_output=True,
+                          text=True, timeout=PATIENCE, check=False)  # fmt: skip
+    first, code = done.stdout.splitlines()
+    assert first and (code, done.stderr) in (("0", ""), ("141", ""))
+
+
+@unix
+def test_output_that_cannot_be_written_is_told_in_a_line():
+    """A full disk; and an output that was closed is none."""
+    command = [sys.executable, "-m", "tca_mj.cli", "list", REACH]
+    for words in (command, [*command[:-2], "--help"]) if Path("/dev/full").exists() else ():
+        with open("/dev/full", "w") as full:
+            done = subprocess.run(words, stdout=full, stderr=subprocess.PIPE, text=True,
+                                  env=BUFFERED, check=False)  # fmt: skip
+        assert done.returncode == 2 and done.stderr.endswith(": No space left on device\n")
+        assert len(done.stderr.splitlines()) == 1
+    closed = ["sh", "-c", 'exec "$@" >&-', "sh", *command]
+    done = subprocess.run(closed, capture_output=True, text=True, env=BUFFERED, check=False)
+    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
 
 
 @pytest.mark.parametrize("value", ["nonsense", "cgl" if sys.platform != "darwin" else "egl"])

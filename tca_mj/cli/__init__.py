@@ -7,7 +7,7 @@ import sys
 from collections import Counter
 from collections.abc import Sequence
 from contextlib import suppress
-from typing import Any
+from typing import Any, TextIO
 
 import tca_mj
 from tca_mj.cli import check, learn, play
@@ -51,37 +51,57 @@ def main(argv: Sequence[str] | None = None) -> int:
     arguments = argparse.Namespace(command="", kept=[], needs=lambda: "")
     with Signals() as signals:
         try:
-            arguments = _parser().parse_args(argv, arguments)
-            _check_rendering()
-            return _run(arguments)
+            return _run(argv, arguments)
         except KeyboardInterrupt:
             signals.over(leaving=argv is None)
             heard = signals.heard
             said = "interrupted" if heard is signal.SIGINT else f"ended by {heard.name}"
-            print("; ".join([said, *arguments.kept]), file=sys.stderr)
+            _end("; ".join([said, *arguments.kept]))
             exec("")  # CPython would die of SIGINT if that had struck inside another exec
             return 128 + heard
         except BrokenPipeError:  # who reads has seen enough, as head
-            with suppress(OSError):
-                os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+            _end()
             return 128 + 13
         except (ImportError, OSError, ValueError) as error:
             hint = arguments.needs() if isinstance(error, ImportError) else ""
-            print(f"tca-mj {arguments.command}: {_said(error)}{hint}", file=sys.stderr)
+            _end(f"tca-mj {arguments.command}: {_said(error)}{hint}")
             return 2
 
 
-def _run(arguments: argparse.Namespace) -> int:
+def _run(argv: Sequence[str] | None, arguments: argparse.Namespace) -> int:
+    """Reads the command and runs it; what it has said, a help too, is out when this ends."""
     before = _warnings()
     try:
+        _parser().parse_args(argv, arguments)
+        _check_rendering()
         return arguments.run(arguments)
     finally:
-        sys.stdout.flush()
+        for stream in _streams():
+            stream.flush()
         warned = _warnings() - before
         if warned:
             from tca_mj.model.mujoco_warnings import warning_line
 
             print(warning_line(warned), file=sys.stderr)
+
+
+def _end(line: str = "") -> None:
+    """Says a last line on standard error, if that is still read. What nobody took, a pipe, a full
+    disk or a terminal that is gone, is dropped: Python would complain of it as it ends.
+    """
+    with suppress(OSError):
+        print(line, end="\n" if line else "", file=sys.stderr)
+    for stream in _streams():
+        try:
+            stream.flush()
+        except OSError:
+            with suppress(OSError), open(os.devnull, "wb") as nowhere:
+                os.dup2(nowhere.fileno(), stream.fileno())
+
+
+def _streams() -> list[TextIO]:
+    """Standard output and error, where they are not closed."""
+    return [stream for stream in (sys.stdout, sys.stderr) if stream is not None]
 
 
 def _warnings() -> Counter[str]:
