@@ -28,7 +28,7 @@ demo: $(INSTALLED)  ## the arm moves a screwdriver and a circuit board; recordin
 	@echo "open a recording:  $(BIN)/rerun $(DEMO)/screwdriver/rollout.rrd"
 
 test: $(INSTALLED)  ## all tests
-	MPLBACKEND=Agg $(BIN)/pytest -q
+	MPLBACKEND=Agg $(BIN)/pytest -q -n auto --maxprocesses 8 --dist loadfile
 
 bench: $(INSTALLED)  ## speed and accuracy figures, in runs/bench
 	$(BIN)/python scripts/benchmark.py --out runs/bench
