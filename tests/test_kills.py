@@ -189,8 +189,9 @@ def kill(name: str, times: int, folder: Path, seed: int) -> Counter[str]:
     """Kills a command, begins it again until it was killed often enough, and lets it end.
 
     Returns:
-        Numbers of kills, of those that came while it had the folder, of times that it had come to
-        its end in between, and the longest time that a process has lived on [ms].
+        Numbers of kills, of those that came while it had the folder and of those that found
+        something finished there, of times that it had come to its end in between, and the longest
+        time that a process has lived on [ms].
     """
     command, drawn = COMMANDS[name], random.Random(seed)
     whole = Killer(command, folder / "whole")
@@ -198,11 +199,11 @@ def kill(name: str, times: int, folder: Path, seed: int) -> Counter[str]:
     expected = command.result(whole.out)
     killer, found = Killer(command, folder / "killed"), Counter[str]()
     while found["kills"] < times:
-        reached = command.so_far(killer.out) if killer.out.exists() else 0
         run = killer.start()
         try:
             run.wait(timeout=drawn.uniform(0.0, duration))
         except subprocess.TimeoutExpired:
+            reached = command.so_far(killer.out) if killer.out.exists() else 0  # while it runs
             os.kill(run.pid, signal.SIGKILL)
             found["kills"] += 1
             found["at work"] += killer.holds(run.pid)
@@ -212,6 +213,7 @@ def kill(name: str, times: int, folder: Path, seed: int) -> Counter[str]:
                 found["lived on [ms]"] = max(found["lived on [ms]"], lived)
             now = command.so_far(killer.out) if killer.out.exists() else 0
             assert now >= reached
+            found["with something to keep"] += reached > 0
             continue
         found["ended before"] += 1
         assert command.result(killer.out) == expected and killer.left() == []
