@@ -15,14 +15,18 @@ import time
 import uuid
 from collections import Counter
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from tca_mj.agents.evaluate import Evaluation
 from tca_mj.agents.finished import EPISODES, kept
+from tca_mj.agents.output import read_json
 from tca_mj.agents.policies import SavedPolicy
+from tca_mj.agents.sweep import RESULT, TRIALS, Sweep
 from tca_mj.agents.train.runs import STATE, RunFolder
 from tca_mj.files import LOCK
 
@@ -178,6 +182,12 @@ class Killer:
             time.sleep(0.05)
         return time.monotonic() - start
 
+    def end(self) -> None:
+        """Ends what a killed command has left running, without waiting for its own notice."""
+        for process in self.alive():
+            with suppress(ProcessLookupError):
+                os.kill(process, signal.SIGKILL)
+
     def left(self) -> list[str]:
         """Hidden and temporary files."""
         inside = [path for path in self.out.rglob(".*") if path.name != ".validate_storage_marker"]
@@ -230,6 +240,34 @@ def kill(name: str, times: int, folder: Path, seed: int) -> Counter[str]:
 def test_a_few_kills(name, tmp_path):
     times = 1 if name == "train" else 2
     assert kill(name, times, tmp_path, seed=len(name))["kills"] == times
+
+
+def test_a_sweep_that_is_killed_goes_on(tmp_path):
+    """With its first episode finished; the table is that of trials which Ray had no part in."""
+    pytest.importorskip("ray")
+    killer = Killer(COMMANDS["sweep"], tmp_path)
+    run, deadline = killer.start(), time.monotonic() + PATIENCE
+    try:
+        while not (killer.out.exists() and episodes(killer.out)):
+            assert run.poll() is None and time.monotonic() < deadline
+            time.sleep(0.02)
+        os.kill(run.pid, signal.SIGKILL)
+        run.wait()
+        before = [line for path in killer.out.rglob(EPISODES)
+                  for line in path.read_bytes().splitlines(keepends=True)]  # fmt: skip
+    finally:
+        killer.end()
+    killer.finish()
+    assert killer.left() == [] and killer.alive() == []
+    sweep = Sweep(evaluation=Evaluation(task=REACH, policy="random", episodes=4),
+                  axes={"seed": (0, 10), "steps": (150,)})  # fmt: skip
+    after = {path.parent: path.read_bytes() for path in killer.out.rglob(EPISODES)}
+    whole = [line for line in before if line.endswith(b"\n")]
+    assert whole and all(any(line in text for text in after.values()) for line in whole)
+    assert [text.count(b"\n") for text in after.values()] == [4, 4]
+    for trial in sweep.trials():
+        alone = trial.run(tmp_path / "alone" / trial.name)
+        assert read_json(killer.out / TRIALS / trial.name / RESULT)["figures"] == alone["figures"]
 
 
 @pytest.mark.long

@@ -7,6 +7,7 @@ import subprocess
 import sys
 import time
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -23,6 +24,7 @@ from tca_mj.agents.train.search import TROT, SearchConfig, search
 from tca_mj.agents.workers import Workers
 from tca_mj.cli import main
 
+FIRST = cache(searching.first_gait)  # for which a robot is built
 EVERY = GAITS | {"trot": replace(WALK, offset=TROT)}
 
 
@@ -159,6 +161,11 @@ TINY = SearchConfig(
 )
 
 
+@pytest.fixture(autouse=True)
+def built_once(monkeypatch):
+    monkeypatch.setattr(searching, "first_gait", FIRST)
+
+
 @pytest.fixture
 def quiet(monkeypatch):
     class Board:
@@ -247,7 +254,7 @@ def test_a_killed_search_goes_on_to_the_same_curve(tmp_path):
     origin = Origin(algorithm="by hand", seed=0, steps=0)
     start = SavedPolicy(task=TINY.task, origin=origin, gait=replace(WALK, period=2.0),
                         steering=(600.0,) * 4).save(tmp_path / "start.json")  # fmt: skip
-    settings = {"task": WALKING, "start": str(start), "steps": 300, "population": 5, "episodes": 1,
+    settings = {"task": WALKING, "start": str(start), "steps": 160, "population": 5, "episodes": 1,
                 "settling": 0.0, "window": 2.0, "validation_episodes": 1,
                 "validate_every": 2}  # fmt: skip
     out = tmp_path / "killed"
