@@ -24,7 +24,7 @@ from tca_mj.agents.policies import Policy
 from tca_mj.agents.progress import progress_bar
 from tca_mj.agents.rollout import Step, rollout
 from tca_mj.checks import Seed, door, number
-from tca_mj.envs.task import Headway
+from tca_mj.envs.outcome import Headway
 from tca_mj.envs.wrappers import RecordRerun
 from tca_mj.machine import machine, versions
 from tca_mj.record.film import Film, FilmSpeed

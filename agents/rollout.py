@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tca_mj.agents.policies import Policy
-from tca_mj.envs.task import how_it_ended
+from tca_mj.envs.outcome import how_it_ended
 
 
 @dataclass(frozen=True, slots=True)

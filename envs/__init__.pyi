@@ -4,10 +4,11 @@ from tca_mj.envs.course import Places, TetrapodCourse, TetrapodCourseVector
 from tca_mj.envs.hanging import NoRest, StaticTip, hang
 from tca_mj.envs.morph import MorphModule, MorphModuleVector, hanging_module
 from tca_mj.envs.options import Constant, Option, Options, Uniform, variation_options
+from tca_mj.envs.outcome import Headway, TaskState, Verdict
 from tca_mj.envs.reach import BendReach, BendReachVector
 from tca_mj.envs.recipe import Recipe
 from tca_mj.envs.table import Entry, Table
-from tca_mj.envs.task import HEATINGS, Headway, SimulatedTask, TaskArguments, TaskState, Verdict
+from tca_mj.envs.task import HEATINGS, SimulatedTask, TaskArguments
 from tca_mj.envs.tetrapod import GaitTask, TetrapodGait, TetrapodGaitVector
 from tca_mj.envs.vector import TaskVector, register_task
 from tca_mj.envs.viewer import NoDisplay, ViewerEnvironment, ViewerPolicy, launch, need_display

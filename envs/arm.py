@@ -13,9 +13,10 @@ from numpy.typing import ArrayLike, NDArray
 from tca_mj.assets import mjcf
 from tca_mj.checks import door, require_one_of
 from tca_mj.envs.options import Option, Options, Setup, Uniform, variation_options
+from tca_mj.envs.outcome import Verdict
 from tca_mj.envs.rewards import tolerance
 from tca_mj.envs.table import Entry, Table
-from tca_mj.envs.task import SimulatedTask, TaskArguments, Verdict, parts
+from tca_mj.envs.task import SimulatedTask, TaskArguments, parts
 from tca_mj.envs.vector import TaskVector
 from tca_mj.model.scene import scene
 from tca_mj.robots.arm import ArmSpec, arm

@@ -13,8 +13,9 @@ from numpy.typing import ArrayLike, NDArray
 from tca_mj.checks import door, some
 from tca_mj.envs.hanging import hang
 from tca_mj.envs.options import Option, Options, Setup, Uniform, variation_options
+from tca_mj.envs.outcome import Verdict
 from tca_mj.envs.table import Entry, Table
-from tca_mj.envs.task import SimulatedTask, TaskArguments, Verdict, parts
+from tca_mj.envs.task import SimulatedTask, TaskArguments, parts
 from tca_mj.envs.vector import TaskVector
 from tca_mj.model.part import Part
 from tca_mj.modules.morphing import MorphingSpec, morphing_module

@@ -6,7 +6,7 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from copy import deepcopy
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict
 from typing import Any, ClassVar, TypedDict, Unpack
 
 import gymnasium as gym
@@ -14,72 +14,30 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tca_mj.checks import door, quantity, require_one_of, shown, some, whole
+from tca_mj.checks import door, quantity, require_one_of, shown, whole
 from tca_mj.envs.options import Option, Options, Setup, variation_of, variation_options
+from tca_mj.envs.outcome import (
+    Action,
+    Headway,
+    Observation,
+    Outcome,
+    TaskState,
+    Verdict,
+    broken_off,
+    finite,
+    harm,
+    measured,
+    together,
+)
 from tca_mj.envs.recipe import Recipe
 from tca_mj.envs.table import Entry, Table, commands
 from tca_mj.model.part import Part
 from tca_mj.record.render import Offscreen, Pixels, colour_tendons
 from tca_mj.registry import ControlPeriod
-from tca_mj.sim import Drive, Simulation, SimulationDiverged, SimulationOverheated, Timestep
-from tca_mj.state import SimulationState, get_state, set_state
+from tca_mj.sim import Drive, Simulation, SimulationDiverged, Timestep
+from tca_mj.state import get_state, set_state
 from tca_mj.tca import HeatSpec, Supply, Thermostat
 from tca_mj.variation import AMBIENT, Nominal, Variation
-
-Observation = NDArray[np.float32]
-Action = NDArray[np.float32]
-Outcome = tuple[Observation, float, bool, bool, dict[str, Any]]
-"""What ``step`` returns: observation, reward, terminated, truncated and info."""
-
-
-@dataclass(frozen=True, kw_only=True, slots=True)
-class Verdict:
-    """What a task says of a step that went well.
-
-    Attributes:
-        terms: Its own terms of the reward.
-        success: Whether the task is done, which ends the episode.
-        ended: What else ends it, or None.
-        seen: Rows of the observation that judging has changed.
-    """
-
-    terms: Mapping[str, float]
-    success: bool = False
-    ended: str | None = None
-    seen: Mapping[str, ArrayLike] = field(default_factory=dict)
-
-
-@dataclass(frozen=True, kw_only=True, slots=True)
-class Headway:
-    """How a robot gets on.
-
-    Attributes:
-        along: Distance along its way [m].
-        aside: Distance from the line of its way, positive to the left [m].
-        weight: Weight of the robot [N].
-    """
-
-    along: float
-    aside: float
-    weight: float
-
-
-@dataclass(frozen=True, kw_only=True, slots=True, eq=False)
-class TaskState:
-    """The state of an episode.
-
-    Attributes:
-        simulation: That of the simulation.
-        variation: By how much the robot is off.
-        random: That of the generator.
-        episode: What the task itself remembers.
-    """
-
-    simulation: SimulationState
-    variation: Variation
-    random: Mapping[str, Any]
-    episode: Mapping[str, Any]
-
 
 # What of a task may change in an episode has one of these types; and what never does, by name.
 _VALUES = (bool, int, float, str, tuple, dict, np.ndarray, np.generic)
@@ -454,7 +412,7 @@ class SimulatedTask(gym.Env[Observation, Action], ABC):
         if ended is not None:
             info["termination_reason"] = ended
         if error is not None or outside:
-            info = _finite(info)
+            info = finite(info)
             terms = info["reward_terms"]
         terminated, truncated = success or ended is not None, reason is not None
         return observation, float(sum(terms.values())), terminated, truncated, info
@@ -497,37 +455,13 @@ class SimulatedTask(gym.Env[Observation, Action], ABC):
 
     def harm(self) -> str | None:
         """What the robot does not survive, or None."""
-        sim = self.sim
-        hot = sim.temperature > self.max_temperature
-        if some(hot):
-            name = sim.tca_names[int(np.argmax(hot))]
-            return f"overheated: {name} above {self.max_temperature} °C"
-        burnt = sim.spines.temperature > self.max_spine_temperature
-        if burnt.any():
-            name = sim.spines.names[int(np.argmax(burnt))]
-            return f"overheated: {name} above {self.max_spine_temperature} °C"
-        torn = sim.tension > sim.bank.breaking_force
-        if some(torn):
-            i = int(np.argmax(torn))
-            return f"torn: {sim.tca_names[i]} above {sim.bank.breaking_force[i]} N"
-        return None
+        return harm(self.sim, self.max_temperature, self.max_spine_temperature)
 
     def _info(self, *, success: bool) -> dict[str, Any]:
-        sim = self.sim
         return {
-            "time": sim.time,
-            "energy": sim.energy.copy(),
-            "heater_energy": sim.spines.energy.copy(),
-            "temperature": sim.temperature.copy(),
-            "body_temperature": sim.body_temperature.copy(),
-            "spine_temperature": sim.spines.temperature.copy(),
-            "extrapolated": sim.extrapolated,
-            "tension": sim.tension,
-            "damaged": sim.spines.damaged.copy(),
-            "variation": self._varied.copy(),
-            "success": success,
+            **measured(self.sim), "variation": self._varied.copy(), "success": success,
             **self.details(),
-        }
+        }  # fmt: skip
 
     def command(self, action: Action) -> NDArray[np.float64]:
         """The action as finite numbers within -1 and 1.
@@ -607,27 +541,6 @@ class SimulatedTask(gym.Env[Observation, Action], ABC):
             self._screen = None
 
 
-def together(before: Outcome | None, now: Outcome) -> Outcome:
-    """Outcome of two intervals of one step, the later of which is ``now``."""
-    if before is None:
-        return now
-    observation, _, terminated, truncated, info = now
-    earned = before[4]["reward_terms"]
-    terms = {name: earned[name] + term for name, term in info["reward_terms"].items()}
-    info |= {"reward_terms": terms, "cost": before[4]["cost"] + info["cost"]}
-    return observation, float(sum(terms.values())), terminated, truncated, info
-
-
-def _finite(info: dict[str, Any]) -> dict[str, Any]:
-    """An info in which what is not finite is 0."""
-    return {
-        key: _finite(value) if isinstance(value, dict)
-        else np.nan_to_num(value, posinf=0.0, neginf=0.0) if np.asarray(value).dtype.kind == "f"
-        else value
-        for key, value in info.items()
-    }  # fmt: skip
-
-
 def parts(name: str, time: float, part: float, *, of: int = 1) -> int:
     """How many times ``part`` makes up a time, a multiple of ``of``.
 
@@ -645,20 +558,3 @@ def _times(part: float, time: float) -> int:
     """How many times a time makes up another; 0 if that is no whole number."""
     count = round(time / part)
     return count if abs(count * part - time) < 1e-9 else 0
-
-
-def broken_off(error: SimulationDiverged | None) -> str | None:
-    """Why a simulation broke off, as a reason to truncate an episode; None if it did not."""
-    if error is None:
-        return None
-    kind = "overheated" if isinstance(error, SimulationOverheated) else "diverged"
-    return f"{kind}: {error}"
-
-
-def how_it_ended(terminated: bool, truncated: bool, info: dict[str, Any]) -> str | None:
-    """Why an episode is over, in a few words; None if it goes on."""
-    if terminated:
-        return "success" if info.get("success") else info.get("termination_reason", "terminated")
-    if truncated:
-        return info.get("truncation_reason", "time limit")
-    return None

@@ -22,10 +22,11 @@ from tca_mj.envs.command import (
     drawn,
 )  # fmt: skip
 from tca_mj.envs.options import Constant, Option, Options, Setup, Uniform, variation_options
+from tca_mj.envs.outcome import Headway, TaskState, Verdict
 from tca_mj.envs.recipe import Recipe
 from tca_mj.envs.stance import CAMERAS, LEG_TCAS, Stance, tetrapod_scene
 from tca_mj.envs.table import Entry, Table
-from tca_mj.envs.task import Headway, SimulatedTask, TaskArguments, TaskState, Verdict, parts
+from tca_mj.envs.task import SimulatedTask, TaskArguments, parts
 from tca_mj.envs.vector import TaskVector
 from tca_mj.robots.tetrapod import LEGS, TetrapodSpec
 from tca_mj.sim import Drive, Timestep

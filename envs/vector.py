@@ -24,8 +24,9 @@ from numpy.typing import NDArray
 
 from tca_mj.batch import SimulationBatch
 from tca_mj.checks import Count, door, instance, require_one_of, shown, text, whole
+from tca_mj.envs.outcome import Observation, Outcome, together
 from tca_mj.envs.table import commands
-from tca_mj.envs.task import Observation, Outcome, SimulatedTask, together
+from tca_mj.envs.task import SimulatedTask
 from tca_mj.registry import Envs, EpisodeSteps
 
 Options = Mapping[str, Any] | None

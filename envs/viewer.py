@@ -19,7 +19,7 @@ import numpy as np
 from dm_env import specs
 from numpy.typing import NDArray
 
-from tca_mj.envs.task import how_it_ended
+from tca_mj.envs.outcome import how_it_ended
 from tca_mj.record.render import colour_tendons
 
 Action = NDArray[np.float32]

@@ -17,8 +17,8 @@ from gymnasium.vector import VectorWrapper
 from gymnasium.vector.utils import batch_space
 
 from tca_mj.checks import door
+from tca_mj.envs.outcome import Observation, how_it_ended
 from tca_mj.envs.table import Table
-from tca_mj.envs.task import Observation, how_it_ended
 from tca_mj.envs.vector import TaskVector
 from tca_mj.record import Recorder
 from tca_mj.record.recorder import Chunk, Every, Radius

@@ -46,9 +46,9 @@ INTERNAL = {
     "tca_mj.certify": {"": "*"},
     "tca_mj.validation": {"": "*"},
     "tca_mj.envs": {
-        "command": "command_options commanded drawn", "options": "variation_of", "rewards": "*",
-        "stance": "*", "table": "commands",
-        "task": "broken_off how_it_ended parts together",
+        "command": "command_options commanded drawn", "options": "variation_of",
+        "outcome": "broken_off finite harm how_it_ended measured together", "rewards": "*",
+        "stance": "*", "table": "commands", "task": "parts",
     },
     "tca_mj.agents": {
         "cluster": "*", "evaluate": "endings report", "finished": "begun keep",

@@ -14,7 +14,7 @@ from gymnasium.utils.env_checker import check_env
 from rerun.chunk import RrdReader
 
 from tca_mj.envs.arm import ArmPickPlace
-from tca_mj.envs.task import how_it_ended
+from tca_mj.envs.outcome import how_it_ended
 from tca_mj.envs.wrappers import RecordRerun, ScaledObservation, VectorScaledObservation
 
 

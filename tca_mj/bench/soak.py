@@ -30,7 +30,7 @@ from numpy.typing import NDArray
 
 from tca_mj.checks import require_count
 from tca_mj.envs.options import Options
-from tca_mj.envs.task import how_it_ended
+from tca_mj.envs.outcome import how_it_ended
 from tca_mj.machine import machine, versions
 from tca_mj.model.mujoco_warnings import warning_counts
 from tca_mj.pages import made_with, page, table, write_result
