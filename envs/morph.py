@@ -213,7 +213,7 @@ class MorphModule(SimulatedTask):
 
     def judge(self, drive: Drive, harmed: bool) -> Verdict:
         """How near the goal is, and how long the module has been there."""
-        off = not (drive.voltage or drive.fan or self.sim.power.any())
+        off = not (drive.voltage or drive.fan or any(self.sim.power.tolist()))
         before, self._progress = self._progress, self._measure(self._bent)
         self._at_goal = self._at_goal + 1 if off and self._fixed() else 0
         held = self._at_goal * self.interval
@@ -243,11 +243,12 @@ class MorphModule(SimulatedTask):
     def observe(self) -> dict[str, ArrayLike]:
         """See ``OBSERVATION``."""
         sim, self._bent = self.sim, self.angle
+        length = sim.length
         return {
             "spine temperature": sim.spines.temperature,
             "TCA temperature": sim.temperature,
-            "TCA length": sim.length,
-            "TCA resistance": sim.resistance,
+            "TCA length": length,
+            "TCA resistance": sim.bank.resistance(sim.tca, length, strict=False),
             "TCA tension": sim.tension,
             "angle": self._bent,
             "angular velocity": self.data.qvel.dot(self._bent_v),

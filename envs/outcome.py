@@ -119,7 +119,7 @@ def harm(sim: Simulation, hottest: float, hottest_spine: float) -> str | None:
         name = sim.tca_names[int(np.argmax(hot))]
         return f"overheated: {name} above {hottest} °C"
     burnt = sim.spines.temperature > hottest_spine
-    if burnt.any():
+    if some(burnt):
         name = sim.spines.names[int(np.argmax(burnt))]
         return f"overheated: {name} above {hottest_spine} °C"
     torn = sim.tension > sim.bank.breaking_force

@@ -175,7 +175,10 @@ class Table:
         flat: list[float] = []
         for name, size in self._sizes:
             row = values[name]
-            each = [row] if isinstance(row, float) else np.asarray(row).ravel().tolist()
+            if type(row) is np.ndarray and row.ndim == 1:
+                each = row.tolist()
+            else:
+                each = [row] if isinstance(row, float) else np.asarray(row).ravel().tolist()
             if len(each) != size:
                 raise ValueError(f"{name} must have {size} numbers, got {len(each)}")
             flat += each

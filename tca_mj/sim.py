@@ -178,6 +178,7 @@ class Simulation:
         self.bank = _bank([tca.spec for tca in part.tcas], law, ambient)
         self.bank.supply = supply or Supply()
         self.substeps = substeps
+        self._lasting = math.nan, 0  # a duration, and how many updates it takes
         self.gain = 1.0
 
         model = self.model
@@ -505,6 +506,8 @@ class Simulation:
             ValueError: If it is no multiple of ``tca_period``, or more than a million of physics
                 steps.
         """
+        if duration == self._lasting[0]:
+            return self._lasting[1]
         longest = MOST_STEPS // self.substeps * self.tca_period
         updates = round(number("duration", duration, at_most=longest, unit="s") / self.tca_period)
         if updates < 1 or abs(updates * self.tca_period - duration) > 1e-9:
@@ -512,6 +515,7 @@ class Simulation:
                 f"duration must be a positive multiple of tca_period {self.tca_period} s,"
                 f" got {duration}"
             )
+        self._lasting = float(duration), updates
         return updates
 
     def _pull(self, tca: TcaState, length: NDArray[np.float64]) -> Pull:

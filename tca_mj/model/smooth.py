@@ -131,6 +131,7 @@ class SmoothBody:
         # Whether each cell has one hinge, about whose axis it turns; of each joint its cell, the
         # bend by a quarter of whose square it twists the cell, and whether it is the twist.
         self._planar = bool(((joint[1:] >= 0).sum(axis=0) <= 1).all())
+        self._untwisted = self._planar and not (joint[MOTIONS.index("twist")] >= 0).any()
         row, self._column = np.divmod(self._where, len(cells))
         self._across = np.array([0, 2, 1, 0])[row] * len(cells) + self._column
         self._quarter, self._along = 0.25 * ((row == 1) | (row == 2)), 1.0 * (row == 3)
@@ -303,11 +304,13 @@ class SmoothBody:
             tension: Tensions of the TCAs, shape (..., n) [N].
             time: Damping over that stiffness, at least the time step [s].
         """
+        own = self.damping.reshape(*tension.shape[:-1], -1).take(self._where, axis=-1)
+        if self._untwisted:
+            return own
         twist = (tension * time).take(self._tca, axis=-1) * self._twist / strained.each
         twist, flat = self._twists.of(twist), (*tension.shape[:-1], -1)
         across = strained.motion.reshape(flat).take(self._across, axis=-1)
         share = across * across * self._quarter + self._along
-        own = self.damping.reshape(flat).take(self._where, axis=-1)
         return own + share * twist.take(self._column, axis=-1)
 
     def set_damping(self, damping: Array) -> None:

@@ -135,6 +135,8 @@ class Spines:
         Raises:
             ValueError: If one has the wrong shape or is not finite, or there are no spines.
         """
+        if type(voltage) is float and voltage == 0.0 and fan is False:  # as without any spine
+            return self._off, self._still
         volts, blown, shape = within("voltage", voltage), flags("fan", fan), (self.n,)
         for name, array in (("voltage", volts), ("fan", blown)):
             if array.shape not in ((), shape):

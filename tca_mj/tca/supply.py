@@ -141,21 +141,21 @@ class Supply(Checked):
         Raises:
             ValueError: As ``resistance`` does.
         """
-        quantity, limits = self.quantity, (self.max_voltage, self.max_current)
-        limited = any(not isinstance(limit, float) or limit < math.inf for limit in limits)
-        power = command
+        quantity, power = self.quantity, command
         if quantity == "temperature":
             assert self.thermostat is not None
             held = self.thermostat._power(temperature, command, body)
             power = held * (command > self.thermostat.heat.ambient)
-        if limited or quantity in ("voltage", "current"):
+        volts, amperes = self.max_voltage, self.max_current
+        free = type(volts) is type(amperes) is float and volts == amperes == math.inf
+        if not free or quantity in ("voltage", "current"):
             ohms = resistance()
             if quantity == "voltage":
                 power = power_from_voltage(command, ohms)
             elif quantity == "current":
                 power = command**2 * ohms
-            power = np.minimum(power, np.square(self.max_voltage) / ohms)
-            power = np.minimum(power, np.square(self.max_current) * ohms)
+            power = np.minimum(power, np.square(volts) / ohms)
+            power = np.minimum(power, np.square(amperes) * ohms)
         most = self.max_power
         return power if isinstance(most, float) and most == math.inf else np.minimum(power, most)
 
