@@ -506,7 +506,7 @@ class Simulation:
             ValueError: If it is no multiple of ``tca_period``, or more than a million of physics
                 steps.
         """
-        if duration == self._lasting[0]:
+        if type(duration) is float and duration == self._lasting[0]:
             return self._lasting[1]
         longest = MOST_STEPS // self.substeps * self.tca_period
         updates = round(number("duration", duration, at_most=longest, unit="s") / self.tca_period)

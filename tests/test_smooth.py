@@ -39,6 +39,25 @@ def model_of(routes, body=BEAM, nodes=5, **options):
 ROUTES = [TCA, Helix(3e-3, 1.0, 0.4), UTurn.double_helix(4e-3, -0.7, 1.0)]
 
 
+@pytest.mark.parametrize(
+    ("motions", "twists"),
+    [
+        (("bend_x",), ()), (("bend_x", "bend_y"), ()), (("twist",), ("twist",)),
+        (("bend_x", "bend_y", "twist"), ("bend_x", "bend_y", "twist")),
+    ],
+)
+def test_tension_damps_what_twists_and_nothing_else(motions, twists):
+    """Polylines resist twist where a cell can twist; then a bend across a bend twists it, too."""
+    model, data, smooth = model_of(ROUTES, motions=motions)
+    data.qpos[:] = model.qpos_spring + 0.2
+    strained, tension = smooth.at(data.qpos), np.array([0.03, 0.02, 0.05])
+    more = smooth.damped(strained, tension, 1e-2) - smooth.damped(strained, 0.0 * tension, 1e-2)
+    names = [model.joint(int(joint)).name for joint in smooth._joint]
+    assert len(names) == len(motions) * 5
+    for name, each in zip(names, more, strict=True):
+        assert (each > 0.0) == any(twist in name for twist in twists)
+
+
 @pytest.mark.parametrize("curvature", [(0.0, 0.0, 0.0), (20.0, -30.0, 15.0)])
 @pytest.mark.parametrize(
     "motions", [("stretch", "bend_x", "bend_y", "twist"), ("bend_y", "bend_x")]

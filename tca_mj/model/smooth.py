@@ -131,7 +131,6 @@ class SmoothBody:
         # Whether each cell has one hinge, about whose axis it turns; of each joint its cell, the
         # bend by a quarter of whose square it twists the cell, and whether it is the twist.
         self._planar = bool(((joint[1:] >= 0).sum(axis=0) <= 1).all())
-        self._untwisted = self._planar and not (joint[MOTIONS.index("twist")] >= 0).any()
         row, self._column = np.divmod(self._where, len(cells))
         self._across = np.array([0, 2, 1, 0])[row] * len(cells) + self._column
         self._quarter, self._along = 0.25 * ((row == 1) | (row == 2)), 1.0 * (row == 3)
@@ -190,6 +189,7 @@ class SmoothBody:
                 polyline[i, MOTIONS.index(motion)] = curving
         length, curved = self._curves.straight()
         self._twist = polyline[:, MOTIONS.index("twist")] * length
+        self._twisting = bool(self._twist.any())  # whether a polyline resists twist at all
         total = np.zeros((*self._shape, self._lengths.size))
         bends = [MOTIONS.index("bend_x"), MOTIONS.index("bend_y")]
         for bend, more in zip(bends, curved - polyline[:, bends].T, strict=True):
@@ -305,7 +305,7 @@ class SmoothBody:
             time: Damping over that stiffness, at least the time step [s].
         """
         own = self.damping.reshape(*tension.shape[:-1], -1).take(self._where, axis=-1)
-        if self._untwisted:
+        if not self._twisting:
             return own
         twist = (tension * time).take(self._tca, axis=-1) * self._twist / strained.each
         twist, flat = self._twists.of(twist), (*tension.shape[:-1], -1)

@@ -96,7 +96,7 @@ def resistance(
     with np.errstate(invalid="ignore"):
         short = 1.0 - length / wire.rest_length
         left = np.where(short < 0.0, wire.stretch, wire.contraction) * short + 1.0
-    good = (length > 0.0) & (left > 0.0) & np.isfinite(temperature)
+    good = (np.minimum(length, left) > 0.0) & np.isfinite(temperature)
     if not every(good):
         if strict:
             within("temperature", temperature)
