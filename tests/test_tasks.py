@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from tca_mj.envs.morph import OBSERVATION, MorphModule
-from tca_mj.envs.task import Verdict
+from tca_mj.envs.outcome import Verdict
 from tca_mj.registry import TASKS
 from tca_mj.testing import CHECKS, check_task
 
