@@ -17,7 +17,7 @@ from tca_mj.envs.wrappers import RecordRerun, ScaledObservation, VectorScaledObs
 __all__ = [
     "ArmPickPlace", "ArmPickPlaceVector", "BendReach", "BendReachVector", "Command", "Constant",
     "Entry", "Following", "GaitTask", "HEATINGS", "Headway", "MorphModule", "MorphModuleVector",
-    "NoDisplay", "NoRest", "Option", "Options", "Places", "Recipe", "Retelling", "RecordRerun",
+    "NoDisplay", "NoRest", "Option", "Options", "Places", "Recipe", "RecordRerun", "Retelling",
     "ScaledObservation", "SimulatedTask", "StaticTip", "Table", "TaskArguments", "TaskState",
     "TaskVector", "TetrapodCourse", "TetrapodCourseVector", "TetrapodGait", "TetrapodGaitVector",
     "Uniform", "VectorScaledObservation", "Verdict", "ViewerEnvironment", "ViewerPolicy", "hang",

@@ -84,7 +84,7 @@ NO_DOOR = {
             "envs.table.Table.read", "envs.table.Table.outside", "envs.table.Table.bounded",
             "envs.task", "envs.vector", "agents.train.sb3_env.*", "agents.policies.actors.Blind",
             "agents.rollout", "agents.scripts.guided", "agents.train.mirrored",
-            "envs.command.Following",
+            "envs.command.Following", "envs.command.Retelling.notes", "envs.command.Retelling.told",
         ),
         _ACTS,
     ),
@@ -428,6 +428,7 @@ class Case:
             return f"ValueError without must and got: {said}"[:300]
         names = [name.rpartition(".")[2] for name in self.surface.parameters]
         words = {word for name in names for word in (name, SAID_AS.get(name, name))}
+        words |= {"fuzzed"} if _OF_A_FILE.search(said) else set()  # the file's name
         kinds = [hostile_of(kind) for kind in self.hostile.values()]
         derived = any(isinstance(kind, int | float) for kind in kinds)  # what follows from it
         if not (derived or any(word in said for word in words)):
