@@ -1,5 +1,7 @@
 """Where a robot is told to go, and how well it follows: direction, speed, and rate of turning."""
 
+from __future__ import annotations
+
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -66,11 +68,11 @@ class Following(NamedTuple):
         """The commanded direction, from world x to y [rad]."""
         return self.heading + self.command.direction
 
-    def told(self, command: Command) -> "Following":
+    def told(self, command: Command) -> Following:
         """With another command from here on."""
         return self._replace(command=command, aside=0.0, lead=0.0)
 
-    def moved(self, x: float, y: float, yaw: float, interval: float) -> "Following":
+    def moved(self, x: float, y: float, yaw: float, interval: float) -> Following:
         """What has become of it.
 
         Args:
@@ -96,7 +98,7 @@ class Following(NamedTuple):
             error=math.remainder(heading - yaw, 2.0 * math.pi),
         )
 
-    def earned(self, before: "Following", speed: float) -> dict[str, float]:
+    def earned(self, before: Following, speed: float) -> dict[str, float]:
         """What that pays, by term of the reward; all are differences, by shaking nothing is earned.
 
         Args:
@@ -204,12 +206,7 @@ class Retelling:
         return info["distance"], info["across"], paid
 
     def told(
-        self,
-        seen: Array,
-        after: Array,
-        reward: Array,
-        notes: Array,
-        random: np.random.Generator,
+        self, seen: Array, after: Array, reward: Array, notes: Array, random: np.random.Generator
     ) -> tuple[Array, Array, Array]:
         """Observations before and after each step and what it earned, with other commands.
 

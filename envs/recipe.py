@@ -28,8 +28,8 @@ class Recipe(Checked):
         scaled: Whether observations are scaled by the table; otherwise they, and the rewards, are
             normalised by running statistics.
         mirrored: Whether half of each batch of memories is mirrored, left for right.
-        wandering: The option that draws commands: where it is given, and not 0, memories are also
-            told with other commands; empty if there is none.
+        growth: Options that grow from 0 to the value that is given, and in how many steps. With one
+            of them memories are also told with other commands, and mirrored front for rear.
         discount: What a reward is worth that comes a second later, above 0 up to 1; None for the
             learner's own, per step [1].
         learner: What else differs from the algorithm's defaults, under the names of
@@ -47,7 +47,7 @@ class Recipe(Checked):
     options: Mapping[str, float] = field(default_factory=dict)
     scaled: bool = False
     mirrored: bool = False
-    wandering: str = ""
+    growth: Mapping[str, int] = field(default_factory=dict)
     discount: _Discount | None = None
     learner: Mapping[str, Any] = field(default_factory=dict)
     interval: _Steps | None = None

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Annotated, Any
+from typing import Annotated, Any, TypeAlias
 
 import numpy as np
 from gymnasium.spaces import Box
@@ -24,6 +24,8 @@ from tca_mj.checks import (
     within,
 )  # fmt: skip
 
+Mirror: TypeAlias = tuple[NDArray[np.int64], NDArray[np.float32]]
+"""For each number of a table where it comes from in a mirror, and its sign."""
 _Size = Annotated[int, partial(whole, at_least=1, at_most=10_000)]  # as long as a picture is wide
 _EDGE = 1.0 + 1e-6  # of actions, which rounding may leave a little outside
 
@@ -45,9 +47,10 @@ class Entry(Checked):
             bounds.
         mirror: Where each number comes from in the mirror that swaps left and right: a place in
             the row, from 1, negative if the sign changes; empty if nothing does.
+        ends: The same in the mirror that swaps front and rear.
 
     Raises:
-        ValueError: If a field is out of its bounds, low above high, or the mirror no mirror.
+        ValueError: If a field is out of its bounds, low above high, or a mirror no mirror.
     """
 
     name: str
@@ -59,16 +62,18 @@ class Entry(Checked):
     centre: Finite = 0.0
     scale: Positive | None = None
     mirror: tuple[int, ...] = ()
+    ends: tuple[int, ...] = ()
 
     def __post_init__(self) -> None:
         Checked.__post_init__(self)
         if self.low > self.high:
             raise ValueError(f"low must be at most high, {self.high}, got {self.low}")
-        if self.mirror and sorted(abs(k) for k in self.mirror) != list(range(1, self.size + 1)):
-            raise ValueError(
-                f"mirror must name each of the {self.size} places of {self.name} once,"
-                f" got {shown(self.mirror)}"
-            )
+        for name, mirror in (("mirror", self.mirror), ("ends", self.ends)):
+            if mirror and sorted(abs(k) for k in mirror) != list(range(1, self.size + 1)):
+                raise ValueError(
+                    f"{name} must name each of the {self.size} places of {self.name} once,"
+                    f" got {shown(mirror)}"
+                )
 
 
 class Table:
@@ -78,7 +83,7 @@ class Table:
         entries: The rows.
         slices: Where each row lies in the array.
         size: Length of the array.
-        symmetric: Whether it says what a mirror makes of it.
+        symmetric: Whether it says what a mirror makes of it that swaps left and right.
     """
 
     @door
@@ -98,12 +103,17 @@ class Table:
         self._scale = np.repeat(scales, sizes).astype(np.float32)
         self._centre = np.repeat([e.centre for e in self.entries], sizes).astype(np.float32)
         self.symmetric = any(entry.mirror for entry in self.entries)
+        self._sides = self._laid([entry.mirror for entry in self.entries])
+        self._ends = self._laid([entry.ends for entry in self.entries])
+
+    def _laid(self, rows: Sequence[tuple[int, ...]]) -> Mirror:
+        """A mirror of the whole table."""
         places = [
-            (self.slices[e.name].start, k) for e in self.entries
-            for k in (e.mirror or range(1, e.size + 1))
+            (self.slices[e.name].start, k) for e, row in zip(self.entries, rows, strict=True)
+            for k in (row or range(1, e.size + 1))
         ]  # fmt: skip
-        self._source = np.array([start + abs(k) - 1 for start, k in places], dtype=np.int64)
-        self._sign = np.array([np.sign(k) for _, k in places], dtype=np.float32)
+        source = np.array([start + abs(k) - 1 for start, k in places], dtype=np.int64)
+        return source, np.array([np.sign(k) for _, k in places], dtype=np.float32)
 
     @door
     def covering(self, bounds: Mapping[str, tuple[float, float]]) -> Table:
@@ -131,7 +141,7 @@ class Table:
         return np.array([self._centre, self._scale])
 
     @property
-    def mirror(self) -> tuple[NDArray[np.int64], NDArray[np.float32]]:
+    def mirror(self) -> Mirror:
         """What a mirror that swaps left and right does: where each number comes from, and its sign.
 
         Raises:
@@ -139,7 +149,18 @@ class Table:
         """
         if not self.symmetric:
             raise ValueError("the table must have a mirror in one of its rows, got none")
-        return self._source, self._sign
+        return self._sides
+
+    @property
+    def ends(self) -> Mirror:
+        """The same of the mirror that swaps front and rear.
+
+        Raises:
+            ValueError: If no row says how.
+        """
+        if not any(entry.ends for entry in self.entries):
+            raise ValueError("the table must have ends in one of its rows, got none")
+        return self._ends
 
     def mirrored(self, array: NDArray[Any]) -> NDArray[Any]:
         """What it makes of an array, shape (..., size), also a scaled one; errors as ``mirror``."""

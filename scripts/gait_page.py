@@ -13,6 +13,7 @@ from __future__ import annotations
 import argparse
 import csv
 import json
+import math
 import time
 from collections.abc import Sequence
 from pathlib import Path
@@ -21,6 +22,8 @@ from typing import Any
 import numpy as np
 from scipy import stats
 
+import tca_mj
+from tca_mj.agents.demo import play
 from tca_mj.agents.evaluate import Evaluation, evaluate, figures
 from tca_mj.agents.policies import shipped
 from tca_mj.agents.train.config import default_config, described
@@ -36,6 +39,8 @@ GAITS = [task.id for task in TASKS if "gait" in task.kwargs]
 SEEDS = tuple(range(5))  # chosen before anything was trained
 ROBOTS = {"episodes": 16, "seed": 1000, "randomise": 0.2}  # the same for everybody
 NOMINAL = {"episodes": 1, "seed": 0}
+COMMANDED = {"episodes": 2, "seed": 0}
+HALF = 9e-3  # speed of which half is commanded [m/s]
 SHOWN = ("speed", "energy_per_metre", "peak_temperature", "drift")
 LEVEL = 0.95
 
@@ -96,6 +101,24 @@ def trained(task: str, seed: int, out: Path) -> dict[str, Any]:
         "curve": rows,
         **measured(task, str(folder), out / f"seed_{seed}" / "measured"),
     }
+
+
+def followed(task: str, policy: str, out: Path) -> dict[str, Any]:
+    """How a policy follows commands: eight directions, two speeds, and the demo of a square."""
+    found: dict[str, Any] = {}
+    fastest = tca_mj.make(task).unwrapped.task.fastest
+    told = {f"{45 * k}°": {"direction": math.remainder(k * math.pi / 4.0, 2.0 * math.pi)}
+            for k in range(8)}  # fmt: skip
+    told |= {"half": {"speed": 0.5 * HALF}, "stand": {"speed": 0.0}}
+    assert fastest > HALF
+    for name, options in told.items():
+        evaluation = Evaluation(task=task, policy=policy, options=options, **COMMANDED)
+        found[name] = figures(evaluate(evaluation, out=out / name)["episodes"])
+    summary = play(
+        task, "tca_mj.agents.scripts.guided:square", arguments={"max_episode_steps": 500},
+        video=False, out=out / "square",
+    )  # fmt: skip
+    return found | {"square": summary["speeds"]}
 
 
 def of_task(task: str, out: Path) -> dict[str, Any]:

@@ -14,7 +14,7 @@ from typing import Annotated, Any
 from tca_mj.checks import quantity, shown
 
 _SOFTEST = 100.0  # of gels that still have a shape [Pa]
-_STIFFEST = 1e13  # diamond has 1e12 [Pa]
+_STIFFEST = 1e25  # diamond has 1e12; limits of theory, as of thin and stiff fibres, go beyond [Pa]
 
 
 def size(
@@ -46,7 +46,7 @@ def size(
 
 
 def modulus(name: str, value: Any, *, typed: float = 1e6) -> float:
-    """One modulus of elasticity [Pa], between those of gels and diamond; errors as ``size``.
+    """One modulus of elasticity [Pa], from that of gels on; errors as ``size``.
 
     Args:
         name: What it is, for the message.

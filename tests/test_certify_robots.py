@@ -414,7 +414,6 @@ def test_the_command_prints_the_table_and_its_exit_code_is_the_verdict(folder, c
         (["robots_here:nothing"], "robot must build a Part, got None from 'robots_here:nothing'"),
         (["robots_here:good", "--hot", "10"], "hot must be finite and above 25 °C, got 10"),
         (["robots_here:good", "--hot", "90", "90"], "hot must be one temperature or 1, got"),
-        (["robots_here:good", "--tolerance", "0"], "position must be finite and above 0, got 0"),
         (["robots_here:good", "bending"], "give modules or robots, got robots_here:good bending"),
         (["bending", "--hot", "100"], "--hot is for a robot, module:function"),
     ],

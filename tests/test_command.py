@@ -165,6 +165,31 @@ def test_a_mirrored_robot_follows_a_mirrored_command():
         right, *_ = envs[1].step(ACTION.mirrored(action))
 
 
+def _turned(table, row):
+    source, sign = table.ends
+    return row[source] * sign
+
+
+@pytest.mark.parametrize("gait", ["walk", "shimmy"])
+def test_front_and_rear_are_alike(gait):
+    """Who walks ahead with his front legs walks back with his rear legs, to a rounding."""
+    envs, beam = [TetrapodGait(gait=gait) for _ in range(2)], gait == "shimmy"
+    here, there = (
+        env.reset(seed=0, options={
+            "bend": TASKS[gait].bend, "yaw": 0.0 if beam else 0.03 * side,
+            "direction": (0.0 if beam else 0.5) if side > 0 else math.pi - (0.0 if beam else 0.5),
+        })[0]
+        for env, side in zip(envs, (1.0, -1.0), strict=True)
+    )  # fmt: skip
+    random, scale = np.random.default_rng(0), OBSERVATION.units[1]
+    for _ in range(10):
+        np.testing.assert_allclose(_turned(OBSERVATION, here) / scale, there / scale, atol=1e-5)
+        action = random.uniform(-1.0, 1.0, ACTION.size).astype(np.float32)
+        here, one, *_ = envs[0].step(action)
+        there, other, *_ = envs[1].step(_turned(ACTION, action))
+        assert one == pytest.approx(other, abs=1e-6)
+
+
 def test_a_slope_pulls_the_robot_down_by_its_sine(walker):
     """The feet hold on 10 degrees; their forces along the ground carry the weight's share."""
     slope, uphill = math.radians(10.0), 0.7

@@ -138,8 +138,10 @@ def test_retold_memories_keep_what_was_done_and_come_from_the_seed(tasks):
     assert all(torch.equal(a, b) for a, b in zip(*batches, strict=True) if a is not None)
     own = slice(0, OBSERVATION.slices["commanded direction"].start)
     states = {one[0][own].tobytes() for one in lived}
-    told = [OBSERVATION.mirrored(row.numpy()) if i < 25 else row.numpy()
-            for i, row in enumerate(batches[0].observations)]  # fmt: skip
+    source, sign = OBSERVATION.ends
+    told = [row[source] * sign if i % 2 == 0 else row
+            for i, row in enumerate(batches[0].observations.numpy())]  # fmt: skip
+    told = [OBSERVATION.mirrored(row) if i < 25 else row for i, row in enumerate(told)]
     assert all(row[own].tobytes() in states for row in told)
     directions = {row[OBSERVATION.slices["commanded direction"]].tobytes() for row in told}
     assert len(directions) >= 40  # four of five are new ones

@@ -119,7 +119,7 @@ def test_parallel_routes_stand_at_equal_angles(count):
         (lambda: Helix(-1e-3), r"radius must be finite and at least 0, got -0\.001"),
         (lambda: Helix(math.nan), "radius must be finite and at least 0, got nan"),
         (lambda: Helix(1e-3, math.inf), "turns must be finite .* got inf"),
-        (lambda: Helix(1e-3, phase=math.nan), "phase must be finite, got nan"),
+        (lambda: Helix(1e-3, phase=math.nan), "phase must be finite and at least -1000"),
         (lambda: UTurn.parallel(1e-3, -1e-3), r"half_width must be .* at least 0 m, got -0\.001"),
         (lambda: UTurn.parallel(1e-3, math.nan), "half_width must be .* got nan"),
         (lambda: parallel(0, 1e-3), "count must be at least 1, got 0"),

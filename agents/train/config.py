@@ -127,7 +127,9 @@ class TrainConfig(Checked):
         scaled: Whether observations are scaled by the task's table; otherwise they and the rewards
             are normalised by running statistics.
         mirrored: Whether half of each batch of memories is mirrored, left for right.
-        retold: Whether memories are also told with other commands.
+        retold: Whether memories are also told with other commands, and mirrored front for rear.
+        growth: Options that grow from 0 to their value, and in how many steps: a robot first learns
+            to get on, then wherever it is told.
         residual: Largest correction of a gait's temperatures, which is what is learned then; 0 for
             a policy of its own [K].
         start: The gait that is corrected: ``scripted``, ``trot``, or a policy's file or name.
@@ -152,6 +154,7 @@ class TrainConfig(Checked):
     scaled: bool = False
     mirrored: bool = False
     retold: bool = False
+    growth: Mapping[str, Steps] = field(default_factory=dict)
     residual: Annotated[float, partial(number, at_least=0.0, at_most=50.0, unit="K")] = 0.0
     start: str = "scripted"
     interval: Steps = 10_000
@@ -172,6 +175,8 @@ class TrainConfig(Checked):
             )
         if self.retold and not self.mirrored:
             raise ValueError("retold must be False where memories are not mirrored, got True")
+        for name in self.growth:
+            require_one_of("growth", name, list(self.options))
         if self.residual and not task.legs:
             raise ValueError(
                 f"residual must be 0 for {self.task}, which has no gait, got {self.residual}"
@@ -213,6 +218,7 @@ def default_config(task: str, algorithm: str | None = None, **change: Any) -> Tr
     if recipe.discount is not None:
         learner["gamma"] = recipe.discount ** (period or known.control_period)
     options = {**recipe.options, **change.pop("options", {})}
+    growing = {name: steps for name, steps in recipe.growth.items() if options.get(name)}
     common: dict[str, Any] = {
         "learner": (OnPolicy if algorithm == "ppo" else OffPolicy)(**learner),
         "steps": recipe.steps,
@@ -221,7 +227,8 @@ def default_config(task: str, algorithm: str | None = None, **change: Any) -> Tr
         "timestep": recipe.timestep,
         "scaled": recipe.scaled,
         "mirrored": recipe.mirrored,
-        "retold": recipe.mirrored and bool(options.get(recipe.wandering)),
+        "retold": recipe.mirrored and bool(growing),
+        "growth": growing,
     }
     if recipe.interval is not None:
         common["interval"] = recipe.interval
@@ -249,6 +256,7 @@ def described(config: TrainConfig) -> str:
         *(["scaled observations"] if config.scaled else []),
         *(["mirrored memories"] if config.mirrored else []),
         *(["told with other commands"] if config.retold else []),
+        *(f"{name} grown in {steps} steps" for name, steps in config.growth.items()),
         *(f"{name} {value}" for name, value in config.options.items()),
         f"{config.envs} environments", f"seed {config.seed}",
     ]  # fmt: skip

@@ -192,6 +192,14 @@ class Run:
                 self._show(kind, known_rows[-1])
         self.marks = self.model.num_timesteps // config.interval
 
+    def begin(self) -> None:
+        """What comes before steps are collected: options of the next resets grow."""
+        config, done = self.config, self.model.num_timesteps
+        if config.growth:
+            shares = {name: min(1.0, done / steps) for name, steps in config.growth.items()}
+            grown = {name: config.options[name] * share for name, share in shares.items()}
+            self.env.venv.tasks.reset_options = {**config.options, **grown}
+
     def mark(self, *, last: bool = False) -> None:
         """Adds a row to the curve, evaluates if it is time to, and writes all there is."""
         self.marks = self.model.num_timesteps // self.config.interval
@@ -295,6 +303,7 @@ class _Watch(BaseCallback):
         if self.num_timesteps // self.run.config.interval > self.run.marks:
             self.run.mark()
             self.bar.set_postfix(self.run.shown())
+        self.run.begin()
 
     def _on_step(self) -> bool:
         return True

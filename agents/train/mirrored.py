@@ -24,7 +24,9 @@ class MirroredReplayBuffer(ReplayBuffer):
     ``ReplayBuffer``.
 
     With ``retelling`` four of five memories come as if another command had been given, which is
-    drawn anew each time: what a body does is worth something else then, and no less true.
+    drawn anew each time: what a body does is worth something else then, and no less true. And where
+    the tables have a mirror that swaps front and rear, every second memory is shown in that, too:
+    who has walked ahead knows how to walk back.
     """
 
     def __init__(
@@ -50,10 +52,10 @@ class MirroredReplayBuffer(ReplayBuffer):
             ValueError: If the tables know no mirror.
         """
         super().__init__(*args, **kwargs)
-        self._mirrors = [
-            tuple(torch.as_tensor(part, device=self.device) for part in table.mirror)
-            for table in (observation, action)
-        ]
+        self._tables = observation, action
+        self._ends = retelling is not None and all(
+            any(entry.ends for entry in table.entries) for table in self._tables
+        )
         self._retelling, self._random = retelling, np.random.default_rng(seed)
         self._notes = np.zeros((self.buffer_size, self.n_envs, 3))
         self._ways = np.zeros((self.n_envs, 2))  # along and across at the last step
@@ -78,11 +80,14 @@ class MirroredReplayBuffer(ReplayBuffer):
             )
         half = len(batch_inds) // 2
 
-        def mirrored(values: Any, mirror: Any) -> torch.Tensor:
-            rows, (source, sign) = self.to_torch(values), mirror
-            return torch.cat([rows[:half, source] * sign, rows[half:]])
+        def mirrored(rows: NDArray[Any], table: Table) -> torch.Tensor:
+            rows[:half] = table.mirrored(rows[:half])
+            if self._ends:
+                source, sign = table.ends
+                rows[::2] = rows[::2, source] * sign
+            return self.to_torch(rows)
 
-        observation, action = self._mirrors
+        observation, action = self._tables
         return ReplayBufferSamples(
             observations=mirrored(seen, observation),
             actions=mirrored(self.actions[where], action),
