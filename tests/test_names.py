@@ -63,7 +63,7 @@ INTERNAL = {
         "reach": "scripted", "tetrapod": "scripted",
     },
     "tca_mj.agents.train": {
-        "config": "best_algorithm described", "deep": "Run exported film record",
+        "config": "best_algorithm described", "deep": "Run exported film learner record",
         "gait_score": "*", "learning_env": "*", "runs": "*", "sb3_env": "silence",
     },
 }  # fmt: skip

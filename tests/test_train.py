@@ -22,7 +22,7 @@ from tca_mj.agents.scripts.tetrapod import GAITS, STEERING, gait_policy
 from tca_mj.agents.train import config as settings
 from tca_mj.agents.train import deep
 from tca_mj.agents.train.config import OffPolicy, OnPolicy, TrainConfig, default_config
-from tca_mj.agents.train.deep import Run, _learner, exported, train
+from tca_mj.agents.train.deep import Run, exported, learner, train
 from tca_mj.agents.train.learning_env import LearningEnv
 from tca_mj.agents.train.runs import RunFolder
 from tca_mj.agents.train.sb3_env import TaskVecEnv
@@ -234,8 +234,8 @@ def test_a_film_can_be_left_for_later(tmp_path, monkeypatch, capsys):
 def test_an_exported_network_acts_as_the_learner_does(algorithm):
     env = VecNormalize(LearningEnv(TaskVecEnv.make(QUICK, 2)), clip_obs=3.0)
     env.obs_rms.mean[:], env.obs_rms.var[:] = 0.3, 2.0
-    learner = replace(LEARNERS[algorithm], hidden=(16, 16))
-    model = _learner(tiny(algorithm, learner=learner), env)
+    wide = replace(LEARNERS[algorithm], hidden=(16, 16))
+    model = learner(tiny(algorithm, learner=wide), env)
     network = exported(model, env, None)
     random = np.random.default_rng(0)
     for _ in range(20):

@@ -26,7 +26,7 @@ from stable_baselines3 import PPO, SAC, TD3
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.noise import NormalActionNoise
-from stable_baselines3.common.vec_env import VecNormalize
+from stable_baselines3.common.vec_env import VecEnv, VecNormalize
 
 from tca_mj.agents.episode import RECORDING, VIDEO, Episode
 from tca_mj.agents.output import write_csv
@@ -169,7 +169,7 @@ class Run:
             self.normalise = VecNormalize(
                 self.env, norm_obs=running, norm_reward=running, gamma=config.learner.gamma
             )
-            self.model = _learner(config, self.normalise)
+            self.model = learner(config, self.normalise)
         else:
             self.env.restore(state["env"])
             self.normalise = pickle.loads(state["normalise"])
@@ -309,8 +309,13 @@ class _Watch(BaseCallback):
         return True
 
 
-def _learner(config: TrainConfig, env: VecNormalize) -> BaseAlgorithm:
-    """A new model."""
+def learner(config: TrainConfig, env: VecEnv) -> BaseAlgorithm:
+    """A new model of Stable-Baselines3.
+
+    Args:
+        config: The settings.
+        env: What it learns in; with mirrored memories round a ``TaskVecEnv``.
+    """
     kind, settings = _LEARNERS[config.algorithm], asdict(config.learner)
     network: dict[str, Any] = {"net_arch": list(settings["hidden"])}
     if "log_std_init" in settings:

@@ -17,6 +17,7 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from copy import deepcopy
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -67,7 +68,7 @@ def benchmark(
     result: dict[str, Any] = {
         "machine": machine(), "versions": versions(), "load": [os.getloadavg()[0]],
         "num_envs": n, "steps": steps, "repetitions": repetitions,
-        "tasks": {}, "training": {}, "left_out": {},
+        "tasks": {}, "training": {}, "by_recipe": {}, "left_out": {},
     }  # fmt: skip
     chosen = list(ids) or [task.id for task in TASKS]
     trained = next((id for id in chosen if task_class(id).recipes), chosen[0])
@@ -78,6 +79,11 @@ def benchmark(
             bar.update()
     with _if_installed("training", result):
         result["training"] = _training(trained, max(int(1024 * scale), 64), min(n, 8))
+    recipes = (id for id in chosen if any(r.scaled for r in task_class(id).recipes.values()))
+    by_recipe = next(recipes, None)
+    if by_recipe is not None:
+        with _if_installed("by_recipe", result):
+            result["by_recipe"] = _by_recipe(by_recipe, max(int(800 * scale), 64))
     result["load"].append(os.getloadavg()[0])
     write_result(out, "vector", result, report(result))
     return result
@@ -100,6 +106,8 @@ def report(result: dict[str, Any]) -> str:
         cells = [f"{slow / fast:.2f}" for slow, fast in pairs]
         ratios.append([id, *cells, *[""] * (5 - len(cells))])
     trained = [[name, f"{rate:.0f}"] for name, rate in result["training"].items()]
+    learned = [[name, f"{rate:.1f}", f"{rate * period:.1f}"]
+               for name, (rate, period) in result["by_recipe"].items()]  # fmt: skip
     return page(
         [*made_with(result),
          f"{result['num_envs']} tasks of each kind, {result['steps']} steps, of each the fastest of"
@@ -112,6 +120,8 @@ def report(result: dict[str, Any]) -> str:
                f"2 threads over 1 (aim: {TARGETS['two_threads']:g})", "by processor time"],
               ratios),
         table(["training with PPO", "frames per second"], trained) if trained else "",
+        table(["training by a task's recipe, its learning included", "decisions per second",
+               "seconds of the robot per second"], learned) if learned else "",
         *(f"Left out: {name}, {why}" for name, why in result["left_out"].items()),
     )  # fmt: skip
 
@@ -228,6 +238,46 @@ def _training(id: str, frames: int, n: int) -> dict[str, float]:
             start = time.perf_counter()
             learner.learn(2 * rollout * n)
             rates[name] = 2 * rollout * n / (time.perf_counter() - start)
+            envs.close()
+    finally:
+        torch.set_num_threads(threads)
+    return rates
+
+
+def _by_recipe(id: str, decisions: int) -> dict[str, tuple[float, float]]:
+    """Decisions per second of processor time, and the time of one [s], of a task's recipe.
+
+    The same learner with the same settings, but for mirrored memories, learns the peer beside it.
+    """
+    import torch
+    from stable_baselines3.common.vec_env import DummyVecEnv, VecEnv
+
+    from tca_mj.agents.train.config import default_config
+    from tca_mj.agents.train.deep import learner
+    from tca_mj.agents.train.sb3_env import TaskVecEnv, silence
+
+    config = default_config(id)
+    config = replace(config, learner=replace(config.learner, learning_starts=config.envs))
+    peer: Any = gym.make(_PEER).unwrapped
+    tasks = TaskVecEnv.make(
+        id, config.envs, scaled=True, num_threads=1, timestep=config.timestep,
+        reset_options=dict(config.options), **config.arguments,
+    )  # fmt: skip
+    peers = DummyVecEnv([lambda: gym.make(_PEER)] * config.envs)
+    ways: list[tuple[str, Any, VecEnv, float]] = [
+        (f"{id} ({config.algorithm.upper()})", config, tasks, config.arguments["control_period"]),
+        (f"{_PEER}, the same settings", replace(config, mirrored=False), peers, peer.dt),
+    ]
+    threads = torch.get_num_threads()
+    torch.set_num_threads(1)
+    rates = {}
+    try:
+        for name, settings, envs, period in ways:
+            model = learner(settings, envs)
+            silence(model)
+            start = time.process_time()
+            model.learn(decisions)
+            rates[name] = decisions / (time.process_time() - start), period
             envs.close()
     finally:
         torch.set_num_threads(threads)
