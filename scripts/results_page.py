@@ -12,6 +12,7 @@ those that come with the policies, ``agents/policies/NAME.csv``.
 import argparse
 import csv
 import json
+import math
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -19,7 +20,7 @@ from typing import Any
 from tca_mj.agents.evaluate import METRICS, Evaluation, cell, evaluate, figures
 from tca_mj.agents.finished import EPISODES, kept
 from tca_mj.agents.policies import SavedPolicy, shipped
-from tca_mj.registry import TASKS, task_class
+from tca_mj.registry import TASKS, find_task, task_class
 
 ROOT = Path(__file__).resolve().parent.parent
 PAGE, DATA = ROOT / "docs" / "results.md", ROOT / "docs" / "results.json"
@@ -33,6 +34,24 @@ CONDITIONS: dict[str, dict[str, Any]] = {
     "ten nodes a leg": {"episodes": 2, "model": "legs"},
     "finer": {"episodes": 1, "model": "fine"},
 }
+# Of gaits, on the nominal robot but for this one thing: what the second table shows.
+_FACTORS = {"friction": (0.8, 1.2), "mass": (0.8, 1.2), "tca_gain": (0.8, 1.2),
+            "heat_loss": (0.8, 1.2), "ambient": (20.0, 30.0)}  # fmt: skip
+_UPHILL = {"5° up": 0.0, "5° down": math.pi, "5° aside": math.pi / 2.0}
+FACTORS: dict[str, dict[str, Any]] = {
+    "± 40 %": {"episodes": 5, "randomise": 0.4},
+    **{
+        f"{name.replace('_', ' ')} {value:g}": {"episodes": 1, "options": {name: value}}
+        for name, ends in _FACTORS.items() for value in ends
+    },
+    **{
+        name: {"episodes": 1,
+               "options": {"slope": math.radians(5.0), "slope_direction": direction}}
+        for name, direction in _UPHILL.items()
+    },
+    "pushed": {"episodes": 1, "options": {"push": 0.05, "push_every": 10.0}},
+    "half the step": {"episodes": 1, "timestep": 3.125e-3},
+}  # fmt: skip
 SHOWN = {
     "gait": ("speed", "drift", "success", "energy_per_metre", "cost_of_transport",
              "peak_temperature", "peak_tension", "return"),
@@ -67,6 +86,9 @@ to come to the end of its time; drift is its size.
 * ± 20 %: friction, mass, TCA gain and heat loss are drawn within 20 %, the surroundings within 5 K
   of 25 °C.
 * ten nodes a leg: legs of ten nodes instead of three, of the same mass.
+* each factor alone, in a table of its own: speeds in mm/s of one episode, that of ± 40 % of five.
+  Slopes are 5°, up, down and to the left of the way; pushes change the velocity of the hub by 0.05
+  m/s every 10 s, from all sides.
 * finer: these legs, and an elastic body instead of a rigid one, every spine of which is a chain of
   its own that bends about both axes, twists and stretches ([the model that certifies the one in
   use](tetrapod-model.md)), at the same time step.
@@ -92,6 +114,9 @@ def cases(tasks: list[str]) -> Iterator[tuple[str, str, str, Evaluation]]:
                 if task == COURSE:
                     more["episodes"] = 1
                 yield task, policy, condition, Evaluation(task=task, policy=policy, **more)
+            for factor, settings in FACTORS.items():
+                if "gait" in find_task(task).kwargs and policy not in ("random", "off"):
+                    yield task, policy, factor, Evaluation(task=task, policy=policy, **settings)
 
 
 def table(task: str, found: dict[str, dict[str, Any]]) -> list[str]:
@@ -103,10 +128,26 @@ def table(task: str, found: dict[str, dict[str, Any]]) -> list[str]:
     lines = [f"| agent | robot | episodes | {' | '.join(heads)} |", "|---" * (3 + len(names)) + "|"]
     for policy, conditions in found.items():
         for condition, entry in conditions.items():
+            if condition in FACTORS:
+                continue
             shown = [cell(name, entry["figures"][name], interval=name in names[:2])
                      if name in entry["figures"] else "" for name in names]  # fmt: skip
             lines.append(f"| {policy} | {condition} | {entry['episodes']} | {' | '.join(shown)} |")
     return lines
+
+
+def factors(found: dict[str, dict[str, Any]]) -> list[str]:
+    """The table of single factors of a task, as Markdown; empty if there is none."""
+    known = {policy: each for policy, each in found.items() if not FACTORS.keys().isdisjoint(each)}
+    if not known:
+        return []
+    lines = [f"| speed [mm/s] | {' | '.join(known)} |", "|---" * (1 + len(known)) + "|"]
+    for name in FACTORS:
+        figures_of = [each[name]["figures"] if name in each else None for each in known.values()]
+        cells = [cell("speed", each["speed"], interval=False) if each else ""
+                 for each in figures_of]  # fmt: skip
+        lines.append(f"| {name} | {' | '.join(cells)} |")
+    return [*lines, ""]
 
 
 def curves() -> list[str]:
@@ -151,7 +192,7 @@ def page(results: dict[str, dict[str, dict[str, Any]]]) -> str:
     """The whole page."""
     lines = [INTRODUCTION]
     for task, found in results.items():
-        lines += [f"## `{task}`", "", *table(task, found), ""]
+        lines += [f"## `{task}`", "", *table(task, found), "", *factors(found)]
     drawn = curves()
     if drawn:
         lines += ["## Learning curves", "", CURVE_NOTE, "", *drawn]

@@ -63,3 +63,13 @@ def test_a_target_is_reached_about_as_often_as_documented(task, name, figures):
     settings = Evaluation(task=task, policy=name, episodes=2, seed=100)
     found = evaluate(settings, progress=False)["figures"]
     assert found["success"]["mean"] >= SHARE * figures["success"]["mean"]
+
+
+def test_the_page_of_gaits_is_what_its_script_makes_of_the_data():
+    script = runpy.run_path(str(ROOT / "scripts" / "gait_page.py"))
+    results = json.loads((ROOT / "docs" / "gaits.json").read_text(encoding="utf-8"))
+    page = (ROOT / "docs" / "gaits.md").read_text(encoding="utf-8")
+    assert script["INTRODUCTION"] in page and script["BY_HAND"] in page
+    for found in results.values():
+        assert "\n".join(script["table"](script["HEADS"], script["rows_of"](found))) in page
+        assert len(found["seeds"]) == len(script["SEEDS"]) == 5

@@ -252,11 +252,12 @@ def _by_recipe(id: str, decisions: int) -> dict[str, tuple[float, float]]:
     import torch
     from stable_baselines3.common.vec_env import DummyVecEnv, VecEnv
 
-    from tca_mj.agents.train.config import default_config
+    from tca_mj.agents.train.config import OffPolicy, default_config
     from tca_mj.agents.train.deep import learner
     from tca_mj.agents.train.sb3_env import TaskVecEnv, silence
 
     config = default_config(id)
+    assert isinstance(config.learner, OffPolicy)  # they alone have mirrored memories
     config = replace(config, learner=replace(config.learner, learning_starts=config.envs))
     peer: Any = gym.make(_PEER).unwrapped
     tasks = TaskVecEnv.make(
