@@ -244,11 +244,12 @@ class Run:
 
     def shown(self) -> dict[str, str]:
         """How well it learns, in a few words."""
-        row = self.rows[-1]
-        best = self.best[0] if self.best else np.nan
-        found = {"return": f"{row.get('return_mean', np.nan):.2f}", "best": f"{best:.2f}"}
-        speed = row.get("speed_mean")
-        return found if speed is None else {"speed": f"{1e3 * speed:.2f} mm/s", **found}
+        row, found = self.rows[-1], {}
+        if "speed_mean" in row:
+            found["speed"] = f"{1e3 * row['speed_mean']:.2f} mm/s"
+        if "return_mean" in row:
+            found["return"] = f"{row['return_mean']:.2f}"
+        return found | ({"best": f"{self.best[0]:.2f}"} if self.best else {})
 
     def save(self) -> None:
         """Replaces the state, then what follows from it."""
