@@ -1,6 +1,7 @@
 from tca_mj.envs.arm import ArmPickPlace, ArmPickPlaceVector
 from tca_mj.envs.command import Command, Following, Retelling
 from tca_mj.envs.course import Places, TetrapodCourse, TetrapodCourseVector
+from tca_mj.envs.gaits import GaitTask
 from tca_mj.envs.hanging import NoRest, StaticTip, hang
 from tca_mj.envs.morph import MorphModule, MorphModuleVector, hanging_module
 from tca_mj.envs.options import Constant, Option, Options, Uniform, variation_options
@@ -9,7 +10,7 @@ from tca_mj.envs.reach import BendReach, BendReachVector
 from tca_mj.envs.recipe import Recipe
 from tca_mj.envs.table import Entry, Table
 from tca_mj.envs.task import HEATINGS, SimulatedTask, TaskArguments
-from tca_mj.envs.tetrapod import GaitTask, TetrapodGait, TetrapodGaitVector
+from tca_mj.envs.tetrapod import TetrapodGait, TetrapodGaitVector
 from tca_mj.envs.vector import TaskVector, register_task
 from tca_mj.envs.viewer import NoDisplay, ViewerEnvironment, ViewerPolicy, launch, need_display
 from tca_mj.envs.wrappers import RecordRerun, ScaledObservation, VectorScaledObservation

@@ -4,7 +4,7 @@ fast as it can where nothing else is said (Sun, 6.3.2)."""
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from typing import Any, ClassVar, Unpack
 
@@ -21,94 +21,19 @@ from tca_mj.envs.command import (
     commanded,
     drawn,
 )  # fmt: skip
+from tca_mj.envs.gaits import ACTION, OBSERVATION, RECIPES, TASKS
 from tca_mj.envs.options import Constant, Option, Options, Setup, Uniform, variation_options
 from tca_mj.envs.outcome import Headway, TaskState, Verdict
-from tca_mj.envs.recipe import Recipe
 from tca_mj.envs.stance import CAMERAS, LEG_TCAS, Stance, tetrapod_scene
-from tca_mj.envs.table import Entry, Table
 from tca_mj.envs.task import SimulatedTask, TaskArguments, parts
 from tca_mj.envs.vector import TaskVector
 from tca_mj.robots.tetrapod import LEGS, TetrapodSpec
 from tca_mj.sim import Drive, Timestep
 
-_SIDES = (4, 5, 6, 1, 2, 3, 10, 11, 12, 7, 8, 9)  # TCAs of the legs, left and right swapped
-_FEET = (4, -5, 6, 1, -2, 3, 10, -11, 12, 7, -8, 9)  # and the places of their feet
-_ENDS = (7, 9, 8, 10, 12, 11, 1, 3, 2, 4, 6, 5)  # front and rear swapped, of TCAs
-_ENDS_FEET = (-7, 8, 9, -10, 11, 12, -1, 2, 3, -4, 5, 6)  # and feet
-
-OBSERVATION = Table(
-    [
-        Entry("TCA temperature", LEG_TCAS, -50.0, 300.0, "°C", centre=100.0, scale=75.0,
-              mirror=_SIDES, ends=_ENDS),
-        Entry("TCA length", LEG_TCAS, 0.0, 0.3, "m", centre=0.04, scale=0.01,
-              mirror=_SIDES, ends=_ENDS),
-        Entry("TCA tension", LEG_TCAS, 0.0, 5.0, "N", centre=0.2, scale=0.2,
-              mirror=_SIDES, ends=_ENDS),
-        Entry("orientation", 4, -1.0, 1.0, "quaternion wxyz", mirror=(1, -2, 3, -4),
-              ends=(1, 2, -3, -4)),
-        Entry("height", 1, -0.7, 0.7, "m", centre=0.03, scale=0.03),
-        Entry("velocity", 3, -10.0, 10.0, "m/s", scale=0.05, mirror=(1, -2, 3), ends=(-1, 2, 3)),
-        Entry("angular velocity", 3, -1000.0, 1000.0, "rad/s", scale=1.0, mirror=(-1, 2, -3),
-              ends=(1, -2, -3)),
-        Entry("foot position", 12, -0.7, 0.7, "m", scale=0.1, mirror=_FEET, ends=_ENDS_FEET),
-        Entry("leg contact", 4, 0.0, 1.0, "1 if foot or plates touch something", centre=0.5,
-              mirror=(2, 1, 4, 3), ends=(3, 4, 1, 2)),
-        Entry("body bend", 1, -6.3, 6.3, "rad"),
-        Entry("commanded direction", 2, -1.0, 1.0, "-", mirror=(1, -2), ends=(-1, 2)),
-        Entry("commanded speed", 1, 0.0, 1.0, "m/s", centre=0.01, scale=0.01),
-        Entry("lead", 1, -10.0, 10.0, "m", scale=0.02),
-        Entry("way aside", 1, -10.0, 10.0, "m", scale=0.05, mirror=(-1,), ends=(-1,)),
-        Entry("commanded turning", 1, -1.0, 1.0, "rad/s", scale=0.05, mirror=(-1,), ends=(-1,)),
-        Entry("heading error", 1, -3.2, 3.2, "rad", scale=0.3, mirror=(-1,), ends=(-1,)),
-    ]
-)  # fmt: skip
-ACTION = Table(
-    [Entry("TCA heating", LEG_TCAS, -1.0, 1.0, "-", off=-1.0, mirror=_SIDES, ends=_ENDS)]
-)
-
-
-@dataclass(frozen=True, kw_only=True, slots=True)
-class GaitTask:
-    """What one of the tasks asks for.
-
-    Attributes:
-        bend: Angle between the ends of the spines [rad].
-        speed: The published speed [m/s]; Sun, Section 6.3.2.
-        beam: Height of the beam that the robot stands astride of, or None for the ground [m].
-        yaw_range: Largest angle by which the robot may look aside at the start [rad].
-        fastest: Commanded speed that means as fast as it can [m/s].
-        turning: Largest commanded rate of turning [rad/s].
-        ways: Directions that can be commanded [rad]; empty for all.
-    """
-
-    bend: float
-    speed: float
-    beam: float | None = None
-    yaw_range: float = 0.05
-    fastest: float = 0.012
-    turning: float = 0.05
-    ways: tuple[float, ...] = ()
-
-
-TASKS = {
-    # Sun's crawling robot is "almost flat": it keeps the memorised shape.
-    "crawl": GaitTask(bend=TetrapodSpec().memory_angle, speed=2.4e-3),
-    "walk": GaitTask(bend=math.radians(93.0), speed=9e-3),
-    # Sun prints neither the angle of the U nor the beam. Both (the beam in beam.xml, 34 mm wide)
-    # are chosen so that legs press the beam while they are nearly straight: bent, they twist.
-    "shimmy": GaitTask(bend=math.radians(215.0), speed=0.75e-3, beam=0.12, yaw_range=0.005,
-                       turning=0.0, ways=(0.0, math.pi)),
-}
-
 # Updates of the TCAs in a control step, at least. With one in every physics step the searched walk
 # is 1.0 % slower, the other gaits 0.3 % or less; with a single one the scripted walk is 1.2 %
 # faster: scripts/tetrapod_contacts.py.
 _UPDATES = 2
-# Of SAC; docs/training.md has what else was tried.
-_LEARNER = {
-    "learning_rate": 1e-3, "batch_size": 256, "tau": 0.01, "ent_coef": "auto_0.05",
-    "learning_starts": 1000, "gradient_steps": 8, "hidden": (128, 128), "buffer_size": 50_000,
-}  # fmt: skip
 _SETTLING = 0.5  # time in which the robot comes to rest after it is put down [s]
 _UPRIGHT = 0.5  # cosine of the tilt from which on it has fallen over
 _STEEPEST = math.radians(10.0)  # largest slope of the ground [rad]
@@ -193,14 +118,7 @@ class TetrapodGait(SimulatedTask):
     robot_argument = ("robot", TetrapodSpec)
     finer = {"legs": _fine_legs, "fine": _fine_body}
     legs = len(LEGS)
-    # By which of what was tried, and how: docs/training.md.
-    recipes = {
-        "sac": Recipe(
-            steps=10_000, control_period=0.4, timestep=10e-3, options={"randomise": 0.2},
-            scaled=True, mirrored=True, growth={"wander": 10_000}, discount=0.94, interval=1000,
-            learner=_LEARNER,
-        ),
-    }  # fmt: skip
+    recipes = RECIPES
     bend_range: ClassVar[float] = math.radians(1.0)  # largest deviation of the body's bend [rad]
 
     @door

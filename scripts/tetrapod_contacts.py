@@ -27,7 +27,8 @@ import numpy as np
 from tca_mj.agents.policies import load_policy
 from tca_mj.agents.scripts.tetrapod import GAITS, gait_policy
 from tca_mj.agents.workers import Workers
-from tca_mj.envs.tetrapod import ACTION, TetrapodGait
+from tca_mj.envs.gaits import ACTION
+from tca_mj.envs.tetrapod import TetrapodGait
 from tca_mj.machine import machine, versions
 from tca_mj.robots.tetrapod import LEGS
 

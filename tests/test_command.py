@@ -10,7 +10,8 @@ import pytest
 
 from tca_mj.agents.scripts.guided import AlongWaypoints, Guided, along_square
 from tca_mj.envs.command import LEASH, Command, Following, drawn
-from tca_mj.envs.tetrapod import ACTION, OBSERVATION, TASKS, TetrapodGait
+from tca_mj.envs.gaits import ACTION, OBSERVATION, TASKS
+from tca_mj.envs.tetrapod import TetrapodGait
 
 OFF = ACTION.still
 

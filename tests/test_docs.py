@@ -99,6 +99,6 @@ def test_the_page_of_tasks_has_the_options_of_all():
 
 
 def test_the_tetrapods_page_has_the_observation_table():
-    from tca_mj.envs.tetrapod import OBSERVATION
+    from tca_mj.envs.gaits import OBSERVATION
 
     assert OBSERVATION.markdown() in (ROOT / "docs" / "tetrapod.md").read_text(encoding="utf-8")

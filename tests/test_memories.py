@@ -11,7 +11,7 @@ from tca_mj.agents.train.mirrored import MirroredReplayBuffer, mirrored_memory
 from tca_mj.agents.train.sb3_env import TaskVecEnv
 from tca_mj.envs import TetrapodGait
 from tca_mj.envs.command import LEASH, Command, Following, Retelling
-from tca_mj.envs.tetrapod import ACTION, OBSERVATION, TASKS
+from tca_mj.envs.gaits import ACTION, OBSERVATION, TASKS
 
 WALK = TASKS["walk"]
 RETELLING = Retelling(OBSERVATION, WALK.speed, WALK.fastest, (), 0.3)

@@ -14,7 +14,7 @@ from tca_mj.agents.policies.actors import arguments_of
 from tca_mj.agents.policies.network import Network
 from tca_mj.agents.scripts.tetrapod import WALK, gait_policy
 from tca_mj.control import Gait
-from tca_mj.envs.tetrapod import ACTION, OBSERVATION
+from tca_mj.envs.gaits import ACTION, OBSERVATION
 from tca_mj.modules.continuum_leg import LegSpec
 from tca_mj.registry import make
 

@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 
 from tca_mj.agents.scripts.tetrapod import GAITS, gait_policy
+from tca_mj.envs.gaits import ACTION, OBSERVATION, TASKS
 from tca_mj.envs.options import variation_of
 from tca_mj.envs.stance import CAMERAS
-from tca_mj.envs.tetrapod import ACTION, OBSERVATION, TASKS, TetrapodGait
+from tca_mj.envs.tetrapod import TetrapodGait
 from tca_mj.envs.wrappers import RecordRerun
 from tca_mj.record.render import RenderingUnavailable
 from tca_mj.robots.tetrapod import LEGS

@@ -13,8 +13,9 @@ from typing import Any
 from tca_mj.agents.policies.gait import GaitPolicy
 from tca_mj.checks import door, require_one_of
 from tca_mj.control import Gait
+from tca_mj.envs.gaits import OBSERVATION
 from tca_mj.envs.stance import LEG_TCAS
-from tca_mj.envs.tetrapod import OBSERVATION, TetrapodGait
+from tca_mj.envs.tetrapod import TetrapodGait
 from tca_mj.robots.tetrapod import TetrapodSpec, tetrapod
 from tca_mj.tca.spec import heat_of
 
