@@ -16,6 +16,7 @@ from tca_mj.agents import episode
 from tca_mj.agents.demo import play
 from tca_mj.envs.arm import ArmPickPlace
 from tca_mj.record.render import RenderingUnavailable, gl_backend
+from tca_mj.registry import DEMOS
 
 OFF = np.array([-1.0, -1.0, -1.0, -1.0, -1.0, 0.0], dtype=np.float32)
 TCAS = ["arm.bending.tca0", "arm.bending.tca1", "arm.bending.tca2", "arm.wrist.tca",
@@ -247,3 +248,13 @@ def test_the_table_of_successes(tmp_path: Path, capsys: pytest.CaptureFixture[st
     foreign = json.dumps(results[0] | {"versions": {"mujoco": "0.1"}})
     (tmp_path / "results.jsonl").write_text(foreign, encoding="utf-8")
     assert script["kept"](tmp_path / "results.jsonl") == {}
+
+
+@pytest.mark.parametrize("name", DEMOS)
+def test_every_demo_begins(name):
+    """Its policy is there, and acts in its task as that is made for it."""
+    demo = DEMOS[name]
+    summary = play(
+        demo.task, demo.policy, arguments=dict(demo.arguments), max_duration=0.4, progress=False
+    )
+    assert summary["duration"] >= 0.4 and summary["phases"] and "diverged" not in summary["ending"]

@@ -70,7 +70,8 @@ def actor(
         name: One of ``NAMES``, the name of a shipped policy, a policy's file, a model of
             Stable-Baselines3 (``.zip``), or the folder of a training run, whose best policy is
             taken; or ``module:callable`` of what makes a policy from the environment, which is
-            imported. If that has ``arguments``, the task is made with them.
+            imported. If that has ``arguments``, or a function of that name that returns them, the
+            task is made with them.
         env: The Gymnasium environment.
         seed: Seed of what is random.
         preprocessing: What became of the observations of a model of Stable-Baselines3, see
@@ -113,7 +114,8 @@ def arguments_of(name: str | Path, task: str) -> dict[str, Any]:
         return dict(task_class(task).scripted_arguments)
     maker = called(name)
     if maker is not None:
-        return dict(getattr(maker, "arguments", {}))
+        needed = getattr(maker, "arguments", {})
+        return dict(needed() if callable(needed) else needed)
     path = None if str(name) in NAMES else find(name)
     return {} if path is None or path.suffix == ZIP else dict(SavedPolicy.read(path).arguments)
 

@@ -11,7 +11,7 @@ import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
-from tca_mj.agents.policies import Policy, load_policy
+from tca_mj.agents.policies import Policy, load_policy, saved_policy
 from tca_mj.checks import Positive, door
 
 WALKER = "tetrapod-command"  # the shipped policy that follows commands
@@ -132,5 +132,9 @@ def waypoints(env: gym.Env[Any, Any]) -> Guided:
     return Guided(load_policy(WALKER, env), env.unwrapped, AlongWaypoints())
 
 
-for _way in (square, waypoints):  # as the walker needs it
-    _way.arguments = {"control_period": 0.5}  # type: ignore[attr-defined]
+def _needed() -> dict[str, Any]:
+    """What the walker needs its task to be made with."""
+    return dict(saved_policy(WALKER).arguments)
+
+
+square.arguments = waypoints.arguments = _needed  # type: ignore[attr-defined]
