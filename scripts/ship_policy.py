@@ -1,4 +1,4 @@
-"""Measures the best policy of a training run and puts it beside those that come with the package.
+"""Measures a policy of a training run and puts it beside those that come with the package.
 
     python scripts/ship_policy.py runs/gaits/TetrapodWalk/seed_0 tetrapod-walk-sac
 
@@ -21,7 +21,7 @@ KEPT = ("speed", "energy_per_metre", "peak_temperature", "return", "success", "d
 
 def main(argv: list[str] | None = None) -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("run", type=Path, help="folder of a training run")
+    parser.add_argument("run", type=Path, help="folder of a training run, or a policy in it")
     parser.add_argument("name", help="of the policy")
     parser.add_argument("--workers", type=int, default=1)
     arguments = parser.parse_args(argv)
@@ -33,7 +33,7 @@ def main(argv: list[str] | None = None) -> None:
     path = replace(saved, evaluation={**ROBOTS, "figures": figures}).save(
         POLICIES / f"{arguments.name}{file.suffix}"
     )
-    curve = arguments.run / ("curve.csv" if file.suffix == ".json" else "evaluations.csv")
+    curve = file.parent / ("curve.csv" if file.suffix == ".json" else "evaluations.csv")
     path.with_suffix(".csv").write_bytes(curve.read_bytes())
     print(f"{report(summary)}\n\n{path}")
 

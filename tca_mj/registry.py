@@ -129,7 +129,7 @@ _SHOWN = (
             name=way,
             task="TCA/TetrapodWalk-v0",
             policy=f"{_GUIDED}:{way}",
-            arguments={"max_episode_steps": 500},
+            arguments={"max_episode_steps": 625},
         )
         for way in ("square", "waypoints")
     ),
