@@ -86,7 +86,7 @@ _LEARNER = {
 }  # fmt: skip
 RECIPES = {
     "sac": Recipe(
-        steps=10_000, control_period=0.4, timestep=10e-3, options={"randomise": 0.2},
+        steps=10_000, control_period=0.5, timestep=10e-3, options={"randomise": 0.2},
         scaled=True, mirrored=True, growth={"wander": 10_000}, discount=0.94, interval=1000,
         learner=_LEARNER,
     ),

@@ -3,6 +3,7 @@
     python scripts/results_page.py                            what is missing, then the page
     python scripts/results_page.py --tasks TCA/BendReach-v0   of one task; the page of all there is
     python scripts/results_page.py --page                     the page alone, of what is there
+    python scripts/results_page.py --factors                  single factors of gaits, too: an hour
 
 Finished episodes are kept in runs/results; a second run goes on where the first one stopped.
 ``docs/results.json`` holds the figures of the page, which tests compare with. Learning curves are
@@ -86,9 +87,9 @@ to come to the end of its time; drift is its size.
 * ± 20 %: friction, mass, TCA gain and heat loss are drawn within 20 %, the surroundings within 5 K
   of 25 °C.
 * ten nodes a leg: legs of ten nodes instead of three, of the same mass.
-* each factor alone, in a table of its own: speeds in mm/s of one episode, that of ± 40 % of five.
-  Slopes are 5°, up, down and to the left of the way; pushes change the velocity of the hub by 0.05
-  m/s every 10 s, from all sides.
+* each factor alone (`--factors`), in a table of its own where it was run: speeds in mm/s of one
+  episode, that of ± 40 % of five. Slopes are 5°, up, down and to the left of the way; pushes change
+  the velocity of the hub by 0.05 m/s every 10 s, from all sides.
 * finer: these legs, and an elastic body instead of a rigid one, every spine of which is a chain of
   its own that bends about both axes, twists and stretches ([the model that certifies the one in
   use](tetrapod-model.md)), at the same time step.
@@ -205,12 +206,14 @@ def main(argv: list[str] | None = None) -> None:
     parser.add_argument("--tasks", nargs="+", choices=known, default=known, metavar="TASK")
     parser.add_argument("--workers", type=int, default=1)
     parser.add_argument("--page", action="store_true", help="run nothing")
+    parser.add_argument("--factors", action="store_true", help="single factors of gaits, too")
     parser.add_argument("--out", type=Path, default=ROOT / "runs" / "results")
     arguments = parser.parse_args(argv)
     results: dict[str, dict[str, dict[str, Any]]] = {}
     for task, policy, condition, evaluation in cases(known):
         folder = arguments.out / task.partition("/")[2] / policy
-        if task in arguments.tasks and not arguments.page:
+        wanted = arguments.factors or condition not in FACTORS
+        if task in arguments.tasks and wanted and not arguments.page:
             print(f"{task}: {policy}, {condition}", flush=True)
             evaluate(evaluation, out=folder, workers=arguments.workers)
         rows = kept(folder / EPISODES, evaluation.key())
