@@ -144,6 +144,10 @@ BY_SURFACE: dict[str, dict[str, Any]] = {
         **{name: [[1.0], [2.0]] for name in ("power", "temperature", "tension")},
         "path": "plot.png",
     },
+    **dict.fromkeys(
+        ("agents.policies.sb3_zip.Model.read", "agents.policies.load.read_zip"),
+        {"path": "nowhere.zip"},  # that there is none is documented
+    ),
     "record.reader.read": {"path": lambda: recorded()},
     "sim.Simulation.bend": {"chains": "body"},
     "sim.Simulation.keep": {"temperature": [60.0] * 3},

@@ -333,5 +333,5 @@ def test_the_command_runs_one_search_for_each_seed(monkeypatch, tmp_path):
     monkeypatch.setattr(searching, "search", called)
     arguments = ["train", "TCA/TetrapodWalk-v0", "--algo", "cma", "--seeds", "2", "--steps", "9"]
     assert main([*arguments, "--out", str(tmp_path), "--workers", "3"]) == 0
-    command = "tca-mj train TCA/TetrapodWalk-v0 --algo cma --steps 9 --start scripted --seeds 2"
+    command = "tca-mj train TCA/TetrapodWalk-v0 --algo cma --steps 9 --seeds 2"
     assert asked == [(seed, 9, f"seed_{seed}", 3, command) for seed in (0, 1)]
