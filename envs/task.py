@@ -253,7 +253,8 @@ class SimulatedTask(gym.Env[Observation, Action], ABC):
             self._half_range = (self.safe_temperature - AMBIENT) / 2.0
             row = commands.slices["TCA heating"]
             power = np.ones(sim.n)  # those that no action drives are off
-            power[: row.stop - row.start] = self.max_power
+            # One number may heat several TCAs, each with a power of its own.
+            power[: max(np.size(self.max_power), row.stop - row.start)] = self.max_power
             thermostat = Thermostat(
                 heat=self.heat, max_power=power, max_temperature=self.safe_temperature,
                 response=self.response or sim.tca_period,

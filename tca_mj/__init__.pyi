@@ -10,6 +10,7 @@ from tca_mj.model.tendon import RoutedTca
 from tca_mj.modules.bending import BendingSpec, bending_module
 from tca_mj.modules.continuum_leg import LegSpec, continuum_leg
 from tca_mj.modules.finger import FingerPairSpec, finger_pair
+from tca_mj.modules.innervated import InnervatedFingerSpec, innervated_finger
 from tca_mj.modules.morphing import MorphingSpec, morphing_module
 from tca_mj.modules.twisting import TwistingSpec, twisting_module
 from tca_mj.record.film import Film
@@ -30,13 +31,13 @@ from tca_mj.variation import Nominal, Variation
 __version__: str
 __all__ = [
     "ArmSpec", "BeamSpec", "BendingSpec", "CATALOGUE", "Chain", "Drive", "FibreSpec", "Film",
-    "FingerPairSpec", "Group", "Helix", "LegSpec", "MixedBank", "MixedState", "MorphingSpec",
-    "Muscle", "MuscleBank", "Nominal", "Outline", "Part", "Recorder", "Route", "RoutedTca",
-    "Simulation", "SimulationBatch", "SimulationDiverged", "SimulationOverheated",
-    "SimulationState", "Supply", "TASKS", "Task", "TcaBank", "TcaSpec", "TetrapodSpec",
-    "Thermostat", "TwistingSpec", "UTurn", "Variation", "add_chain", "add_tca", "arm",
-    "bending_module", "continuum_leg", "episode_steps", "export", "find_task", "finger_pair",
-    "frozen", "get_state", "in_arena", "leg_length", "make", "morphing_module", "new_spec",
-    "parallel", "register", "register_task", "rigid_tetrapod", "scene", "set_state", "stage",
-    "task_class", "tetrapod", "twisting_module",
+    "FingerPairSpec", "Group", "Helix", "InnervatedFingerSpec", "LegSpec", "MixedBank",
+    "MixedState", "MorphingSpec", "Muscle", "MuscleBank", "Nominal", "Outline", "Part", "Recorder",
+    "Route", "RoutedTca", "Simulation", "SimulationBatch", "SimulationDiverged",
+    "SimulationOverheated", "SimulationState", "Supply", "TASKS", "Task", "TcaBank", "TcaSpec",
+    "TetrapodSpec", "Thermostat", "TwistingSpec", "UTurn", "Variation", "add_chain", "add_tca",
+    "arm", "bending_module", "continuum_leg", "episode_steps", "export", "find_task", "finger_pair",
+    "frozen", "get_state", "in_arena", "innervated_finger", "leg_length", "make", "morphing_module",
+    "new_spec", "parallel", "register", "register_task", "rigid_tetrapod", "scene", "set_state",
+    "stage", "task_class", "tetrapod", "twisting_module",
 ]  # fmt: skip

@@ -73,6 +73,11 @@ TASKS = (
         entry_point="tca_mj.envs.reach:BendReach",
         max_episode_steps=200,
     ),
+    Task(
+        id="TCA/FingerSense-v0",
+        entry_point="tca_mj.envs.finger:FingerSense",
+        max_episode_steps=1500,
+    ),
     *(
         Task(
             id=f"TCA/Tetrapod{gait.capitalize()}-v0",
@@ -124,6 +129,7 @@ _GUIDED = "tca_mj.agents.scripts.guided"
 _SHOWN = (
     Demo(name="pick-and-place", task="TCA/ArmPickPlace-v0"),
     Demo(name="tetrapod", task="TCA/TetrapodCourse-v0"),
+    Demo(name="finger", task="TCA/FingerSense-v0"),
     *(
         Demo(
             name=way,

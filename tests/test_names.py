@@ -59,7 +59,7 @@ INTERNAL = {
     },
     "tca_mj.agents.scripts": {
         # one for each task, found by the task's ``scripted``
-        "arm": "scripted", "morph": "calibrate scripted",
+        "arm": "scripted", "finger": "Run calibrate scripted", "morph": "calibrate scripted",
         "reach": "scripted", "tetrapod": "scripted",
     },
     "tca_mj.agents.train": {

@@ -144,7 +144,7 @@ def test_a_fact_of_the_file_is_of_the_kind_that_its_keys_say():
     assert finding("creep-cold", 12.3).verdict == "fitted"
     assert finding("feels", held=True, right=3, runs=4).verdict == "trend held"
     assert finding("feels", held=False, right=3, runs=4).verdict == "trend missed"
-    assert finding("finger-control").verdict == "not covered"
+    assert finding("free-stroke-of-type-0-from-mandrel", name="A").verdict == "not covered"
     assert words("arm-leaves", time=2.0) == "From 2 s on it leaves its plane."
     for key in ("nothing", "pull"):  # no table; a field that is not given
         with pytest.raises(KeyError):

@@ -16,6 +16,7 @@ from tca_mj.model.chain import Member
 from tca_mj.model.part import Part
 from tca_mj.modules.bending import BendingSpec, bending_module
 from tca_mj.modules.finger import FingerPairSpec, finger_pair
+from tca_mj.modules.innervated import InnervatedFingerSpec, innervated_finger
 from tca_mj.modules.twisting import TwistingSpec, twisting_module
 from tca_mj.robots.arm import ArmSpec, arm
 from tca_mj.rod import Segment, StrandLaw
@@ -138,6 +139,16 @@ def _bending(spec: BendingSpec) -> Subject:
     return _module(bending_module, spec, what, force=5e-3, moment=2e-5)
 
 
+def _innervated(spec: InnervatedFingerSpec) -> Subject:
+    def build(times: int) -> Part:
+        return innervated_finger(replace(spec, cylinder=_finer(spec.cylinder, times)))
+
+    return read(
+        build(1), what="innervated finger, 3 parallel TCAs with slack", build=build,
+        tips={"body": "tip"}, force=5e-3, moment=2e-5,
+    )  # fmt: skip
+
+
 def _twisting(spec: TwistingSpec) -> Subject:
     how = "double helix of 2.5 turns" if spec.double else f"helix of {spec.turns:g} turns"
     what = f"twisting module, {how}"
@@ -209,6 +220,7 @@ SUBJECTS: Mapping[str, Callable[[], Subject]] = MappingProxyType({
     "bending": lambda: _bending(BendingSpec()),
     "twisting": lambda: _twisting(TwistingSpec()),
     "twisting-single": lambda: _twisting(TwistingSpec(double=False, nodes=16)),
+    "innervated": lambda: _innervated(InnervatedFingerSpec()),
     "finger": lambda: _finger(FingerPairSpec()),
     "arm": lambda: _arm(ArmSpec()),
 })  # fmt: skip

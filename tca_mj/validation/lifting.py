@@ -215,8 +215,3 @@ def demonstration(runs: int = 20) -> list[Finding]:
     near = all(abs(r / aim - 1.0) < 0.05 for r, aim in zip(reached, (20, 40, 40), strict=True))
     return [finding("feels", held=right == 2 * runs, right=right, runs=2 * runs),
             finding("lifts", held=near, reached=reached)]  # fmt: skip
-
-
-def finger() -> list[Finding]:
-    """The finger needs a body."""
-    return [finding("finger-control")]

@@ -23,6 +23,7 @@ from tca_mj.validation import (
     strokes,
     theories,
     threads,
+    touched,
 )
 from tca_mj.validation.facts import Finding, reasons, table, tally
 
@@ -36,14 +37,14 @@ _CHAPTERS: dict[str, tuple[tuple[Callable[[], list[Finding]], ...], tuple[str, .
     ),
     "Heat and resistance": ((heat.findings,), ()),
     "Sensing and control (Chapter 2)": (
-        (sensors.findings, lifting.steps, lifting.demonstration, lifting.finger),
+        (sensors.findings, lifting.steps, lifting.demonstration),
         ("sensing", "control"),
     ),
     "Models (Chapter 3)": (
         (theories.moduli, theories.spread, theories.dynamics, theories.conical, theories.speed),
         ("fibre", "statics", "spring", "dynamics", "cone"),
     ),
-    "Modules and arm (Chapter 4)": ((modules.findings,), ()),
+    "Modules and arm (Chapter 4)": ((modules.findings, touched.findings), ()),
 }  # fmt: skip
 # Width and height [inches], what draws it, and its caption.
 _FIGURES: dict[str, tuple[float, float, Callable[[Any], None], str]] = {
