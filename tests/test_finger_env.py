@@ -20,6 +20,7 @@ from tca_mj.envs.finger import ACTION, FILTER, OBSERVATION, PERIOD, FingerSense,
 from tca_mj.modules.bending import BendingSpec
 from tca_mj.modules.innervated import InnervatedFingerSpec, innervated_finger
 from tca_mj.sim import Simulation
+from tca_mj.validation.touched import findings as touched_findings
 
 OFF = np.full(ACTION.size, -1.0, dtype=np.float32)
 FULL_ON = np.full(ACTION.size, 1.0, dtype=np.float32)
@@ -89,6 +90,7 @@ def test_the_power_of_two_in_series_with_their_leads():
     ("make", "message"),
     [
         (lambda: InnervatedFingerSpec(tca_length=39e-3), "tca_length must be .*at least 0.04"),
+        (lambda: InnervatedFingerSpec(tca_length=70e-3), "tca_length must be .*below 0.06"),
         (lambda: InnervatedFingerSpec(leads=-1.0), "leads must be .*at least 0"),
         (lambda: InnervatedFingerSpec(cylinder=BendingSpec(count=4)), "cylinder.count must be"),
         (lambda: InnervatedFingerSpec().heating(5.0, 0.1), "resistance must be .*above 0.2"),
@@ -236,6 +238,14 @@ def test_gains_are_the_printed_ones():
     assert GAINS.integral == pytest.approx(0.08 / 0.01) and GAINS.highest == FULL == 255.0
     with pytest.raises(ValueError, match="highest must be above"):
         replace(GAINS, highest=-1.0)
+
+
+def test_the_page_of_validation_says_what_is_found():
+    """After a change: python scripts/validation_page.py."""
+    page = Path(__file__).resolve().parent.parent / "docs" / "validation.md"
+    text, rows = page.read_text(encoding="utf-8"), touched_findings()
+    assert [row.fact for row in rows if f"| {row.model} | {row.verdict} |" not in text] == []
+    assert {row.verdict for row in rows} == {"held", "trend held", "fitted"}
 
 
 def test_the_page_has_the_observation_table():

@@ -39,7 +39,7 @@ class InnervatedFingerSpec(Checked):
 
     Raises:
         ValueError: If a number is not positive, there are not three TCAs, or the TCAs are shorter
-            than the finger.
+            than the finger or so long that their coils touch in it.
 
     Example:
         >>> from tca_mj import InnervatedFingerSpec
@@ -55,8 +55,9 @@ class InnervatedFingerSpec(Checked):
     def __post_init__(self) -> None:
         Checked.__post_init__(self)
         require_one_of("cylinder.count", self.cylinder.count, (_TCAS,))
-        least = self.cylinder.length
-        number("tca_length", self.tca_length, at_least=least, unit="m, that of the cylinder")
+        least, tca = self.cylinder.length, self.cylinder.tca
+        most = least * tca.rest_length / tca.minimum_length  # there its coils touch
+        number("tca_length", self.tca_length, at_least=least, below=most, unit="m")
 
     @property
     def slack(self) -> float:

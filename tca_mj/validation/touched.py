@@ -22,6 +22,7 @@ SETTLED = 5.0  # after the trigger: the steady error is that of the mean from th
 HELD = 8.0  # Sun, Section 4.2.2 [s]
 _RMSE = 1.6337  # of the cubic, Sun, Section 4.2.1 [deg]
 _RISEN = 0.9  # share of the target that is the end of the rise: an estimate
+_PART = 3.0  # of the hold, in which vibration is looked at: an estimate [s]
 _LONGEST = 20.0  # a trigger and what follows [s]
 
 
@@ -67,9 +68,20 @@ class Answer(NamedTuple):
         """Mean error of these over the target [%]."""
         return 100.0 * abs(float(self.steady.mean()) / TARGET - 1.0)
 
-    def swing(self, start: float, end: float) -> float:
-        """Standard deviation of the angle between two times [deg]."""
-        return float(self.angle[(self.time >= start) & (self.time < end)].std())
+    def away(self, start: float, end: float) -> float:
+        """Largest distance from the target between two times [deg]."""
+        meant = (self.time >= start) & (self.time <= end)
+        return float(np.abs(self.angle[meant] - TARGET).max())
+
+    @property
+    def first(self) -> float:
+        """``away`` in the first 3 s after the rise [deg]."""
+        return self.away(self.rise, self.rise + _PART)
+
+    @property
+    def last(self) -> float:
+        """``away`` in the last 3 s of the hold [deg]."""
+        return self.away(self.rise + HELD - _PART, self.rise + HELD)
 
 
 @cache
@@ -107,7 +119,6 @@ def findings() -> list[Finding]:
     fit = np.degrees(fit_displacement(run.resistance, run.angle).rmse)
     touched = found.time <= 0.0
     rest = float(found.resistance[:25].mean())
-    early, late = found.swing(SETTLED - 2.0, SETTLED), found.swing(SETTLED + 2.0, SETTLED + 4.0)
     return [
         finding("finger-leads", rest),
         finding("finger-trigger", -float(found.angle[touched].min()),
@@ -116,8 +127,7 @@ def findings() -> list[Finding]:
         finding("finger-error", found.error, mean=found.steady.mean(),
                 silicone=found.silicone[found.time >= SETTLED][[0, -1]]),
         finding("finger-fit", fit, 0.5 * _RMSE < fit < 2.0 * _RMSE, hot=run.temperature),
-        finding("finger-gains", held=bool(
-            found.rise < slow.rise and late < fast.swing(SETTLED + 2.0, SETTLED + 4.0)
-        ), rise=(found.rise, slow.rise), swing=(late, fast.swing(SETTLED + 2.0, SETTLED + 4.0))),
-        finding("finger-vibration", early, late < 0.5 * early, late=late),
+        finding("finger-gains", held=found.rise < slow.rise and found.last < fast.last,
+                rise=(found.rise, slow.rise), last=(found.last, fast.last)),
+        finding("finger-vibration", found.first, found.last < 0.5 * found.first, last=found.last),
     ]  # fmt: skip
