@@ -145,7 +145,7 @@ def _innervated(spec: InnervatedFingerSpec) -> Subject:
 
     return read(
         build(1), what="innervated finger, 3 parallel TCAs with slack", build=build,
-        tips={"body": "tip"}, force=5e-3, moment=2e-5,
+        tips={"body": "tip"}, force=5e-3, moment=2e-5, temperature=(25.0, 130.0),
     )  # fmt: skip
 
 
