@@ -78,6 +78,7 @@ NO_DOOR = {
             "agents.policies.files.NetworkPolicy", "agents.policies.files.ResidualPolicy",
             "agents.policies.files.with_clock", "agents.policies.gait.GaitPolicy.act",
             "agents.policies.network.Network.__call__", "agents.scripts.arm.PickAndPlace.act",
+            "agents.scripts.finger.FingerPolicy.act",
             "agents.scripts.morph.MorphPolicy.act", "agents.scripts.reach.ReachPolicy.act",
             "agents.scripts.course.CourseWalker", "agents.policies.gait.GaitPolicy.told_of",
             "envs.wrappers.*", "envs.table.Table.scaled", "envs.table.Table.mirrored",
