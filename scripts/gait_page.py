@@ -207,11 +207,14 @@ HEADS = ["policy", "speed on 16 robots [mm/s]", "slowest of them", "nominal [mm/
 def page(results: dict[str, dict[str, Any]], notes: str) -> str:
     """The whole page; what stands below the last table was written by hand."""
     lines = [INTRODUCTION]
+    if len(results) < len(GAITS):
+        missing = ", ".join(f"`{task}`" for task in GAITS if task not in results)
+        lines += [f"Not run with five seeds so far: {missing}.", ""]
     for task, found in results.items():
         lines += [f"## `{task}`", "", f"{found['recipe']}.", "", *table(HEADS, rows_of(found)), "",
                   f"![Learning curves of {task}](pictures/gaits_{name_of(task)}.png)",
                   ""]  # fmt: skip
-    return "\n".join(lines) + notes
+    return "\n".join([*lines, notes])
 
 
 BY_HAND = "## What was tried"

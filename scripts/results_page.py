@@ -58,10 +58,12 @@ SHOWN = {
              "peak_temperature", "peak_tension", "return"),
     "goal": ("success", "duration", "energy", "peak_temperature", "peak_tension", "return"),
 }  # fmt: skip
-# What is drawn of a learning curve, the first of these that it has: columns and what they are.
+# What is drawn of a learning curve, the first of these that it has: columns, what they are, and by
+# what factor.
 CURVES = (
-    (("speed_mean_m_per_s", "validation_speed_m_per_s"), "speed [m/s]"),
-    (("return_mean",), "return"),
+    (("speed_mean_m_per_s", "validation_speed_m_per_s"), "speed [mm/s]", 1e3),
+    (("speed",), "speed in the run's evaluations [mm/s]", 1e3),
+    (("return_mean",), "return", 1.0),
 )
 
 
@@ -160,9 +162,9 @@ def curves() -> list[str]:
             continue
         with file.open(encoding="utf-8", newline="") as text:
             rows = list(csv.DictReader(text))
-        keys, what = next(each for each in CURVES if each[0][0] in rows[0])
+        keys, what, factor = next(each for each in CURVES if each[0][0] in rows[0])
         columns = {
-            key: [(float(row["steps"]), float(row[key])) for row in rows if row.get(key)]
+            key: [(float(row["steps"]), factor * float(row[key])) for row in rows if row.get(key)]
             for key in keys
         }
         picture = PICTURES / f"curve_{name}.png"

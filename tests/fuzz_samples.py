@@ -85,6 +85,13 @@ def model_zip() -> bytes:
     return file.getvalue()
 
 
+@cache
+def _model_file() -> Path:
+    path = Path("good_model.zip").absolute()
+    path.write_bytes(model_zip())
+    return path
+
+
 def _setup() -> dict[str, Any]:
     setup: dict[str, Any] = task_env(TASK).unwrapped.options.setup(np.random.default_rng(0), {})
     return setup
@@ -146,7 +153,7 @@ BY_SURFACE: dict[str, dict[str, Any]] = {
     },
     **dict.fromkeys(
         ("agents.policies.sb3_zip.Model.read", "agents.policies.load.read_zip"),
-        {"path": "nowhere.zip"},  # that there is none is documented
+        {"path": lambda: _model_file()},
     ),
     "record.reader.read": {"path": lambda: recorded()},
     "sim.Simulation.bend": {"chains": "body"},
