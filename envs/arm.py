@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from tca_mj.assets import mjcf
 from tca_mj.checks import door, require_one_of
+from tca_mj.envs.objects import named, stand, touching
 from tca_mj.envs.options import Option, Options, Setup, Uniform, variation_options
 from tca_mj.envs.outcome import Verdict
 from tca_mj.envs.rewards import tolerance
@@ -202,8 +203,8 @@ class ArmPickPlace(SimulatedTask):
         self._body = {kind: int(model.body(f"{kind}.{kind}").id) for kind in OBJECTS}
         self._stand = {k: int(model.body(f"{k}_stand.{k}_stand").mocapid[0]) for k in OBJECTS}
         self._cup = int(model.body("cup.cup").mocapid[0])
-        names = [model.body(int(b)).name for b in model.geom_bodyid]
-        self._is_arm = np.array([name.startswith("arm.") for name in names])
+        self._is_arm = named(model, "arm.")
+        self._is_object = {kind: named(model, f"{kind}.") for kind in OBJECTS}
 
     def prepare(self, setup: Setup) -> None:
         """Puts the arm up, and object and cup where they belong."""
@@ -223,11 +224,10 @@ class ArmPickPlace(SimulatedTask):
     def _place(self, data: mujoco.MjData, kind: str, position: ArrayLike, yaw: float) -> None:
         """Puts an object onto its stand and both where they belong."""
         pose = np.array([*np.asarray(position), _STAND])
-        turn = np.array([np.cos(yaw / 2.0), 0.0, 0.0, np.sin(yaw / 2.0)])
-        data.mocap_pos[self._stand[kind]] = pose
-        data.mocap_quat[self._stand[kind]] = turn
         start = self._free_q[kind]
-        data.qpos[start : start + 7] = [*pose, *turn]
+        stand(data, start, pose, yaw)
+        data.mocap_pos[self._stand[kind]] = pose
+        data.mocap_quat[self._stand[kind]] = data.qpos[start + 3 : start + 7]
 
     def drive(self, command: NDArray[np.float64]) -> Drive:
         """What the TCAs are told and, at once, velocity of the base; see the class."""
@@ -293,12 +293,7 @@ class ArmPickPlace(SimulatedTask):
 
     def _touched(self) -> bool:
         """Whether the arm touches the object."""
-        pairs = self.data.contact.geom
-        if len(pairs) == 0:
-            return False
-        bodies = self.model.geom_bodyid[pairs]
-        mine = (bodies == self._body[self.object]).any(axis=1)
-        return bool((mine & self._is_arm[pairs].any(axis=1)).any())
+        return touching(self.data, self._is_object[self.object], self._is_arm)
 
     def details(self) -> dict[str, Any]:
         """The object, and whether the arm touches it."""

@@ -11,13 +11,13 @@ from typing import Annotated
 
 import mujoco
 
-from tca_mj.checks import Checked, door, number, within
+from tca_mj.checks import Checked, door
 from tca_mj.hints import Mass, Section, size
 from tca_mj.model.part import Part, new_spec
-from tca_mj.model.surface import TOUCHES_NOTHING
 from tca_mj.modules.bending import BendingSpec, bending_module
 from tca_mj.modules.finger import FingerPairSpec, finger_pair
 from tca_mj.modules.twisting import TwistingSpec, twisting_module
+from tca_mj.robots.lift import LiftSpec, add_lift
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -50,15 +50,12 @@ class ArmSpec(Checked):
 
     def __post_init__(self) -> None:
         Checked.__post_init__(self)
-        low, high = within("travel", self.travel, shape=(2,), above=0.0, unit="m")
-        size("travel", float(high), kind="slides", at_most=10.0)
-        if not low < high:
-            raise ValueError(f"travel must be a low and a higher height, got {self.travel}")
-        size("height", self.height, kind="slides", at_most=10.0)
-        number("height", self.height, at_least=low, at_most=high, unit="m, of travel")
+        _ = self.lift  # which refuses what a carriage cannot do
 
-
-_DOWN = (0.0, 1.0, 0.0, 0.0)  # z to -z, half a turn about x
+    @property
+    def lift(self) -> LiftSpec:
+        """The carriage that is its base."""
+        return LiftSpec(height=self.height, travel=self.travel, speed=self.speed)
 
 
 @door
@@ -87,22 +84,7 @@ def arm(spec: ArmSpec | None = None) -> Part:
     """
     spec = spec or ArmSpec()
     mjspec = new_spec("arm")
-    base = mjspec.worldbody.add_body(name="base")
-    base.add_joint(
-        name="lift", type=mujoco.mjtJoint.mjJNT_SLIDE, axis=[0.0, 0.0, 1.0], ref=0.0,
-        range=list(spec.travel), limited=True,
-    )  # fmt: skip
-    base.add_geom(
-        name="carriage", type=mujoco.mjtGeom.mjGEOM_BOX, size=[14e-3, 14e-3, 4e-3],
-        pos=[0.0, 0.0, 4e-3], rgba=[0.25, 0.27, 0.3, 1.0], **TOUCHES_NOTHING | {"mass": 0.1},
-    )  # fmt: skip
-    base.add_site(name="mount", quat=list(_DOWN), group=4)
-    lift = mjspec.add_actuator(name="lift", trntype=mujoco.mjtTrn.mjTRN_JOINT, target="lift")
-    lift.set_to_intvelocity(kp=2000.0, dampratio=1.0)
-    lift.ctrlrange = [-spec.speed, spec.speed]
-    lift.actlimited = 1
-    lift.actrange = list(spec.travel)
-
+    add_lift(mjspec, spec.lift)
     part = Part(mjspec)
     part.attach(bending_module(spec.bending), to="mount", prefix="bending")
     _connector(part, "bending.tip", spec, spec.bending.outer_diameter / 2.0)
