@@ -1,8 +1,10 @@
+from tca_mj.envs.adaptive import AdaptiveGrasp, AdaptiveGraspVector
 from tca_mj.envs.arm import ArmPickPlace, ArmPickPlaceVector
 from tca_mj.envs.command import Command, Following, Retelling
 from tca_mj.envs.course import Places, TetrapodCourse, TetrapodCourseVector
 from tca_mj.envs.finger import FingerSense, FingerSenseVector, SensedFinger
 from tca_mj.envs.gaits import GaitTask
+from tca_mj.envs.grasp import Grasp, GraspVector
 from tca_mj.envs.hanging import NoRest, StaticTip, hang
 from tca_mj.envs.morph import MorphModule, MorphModuleVector, hanging_module
 from tca_mj.envs.options import Constant, Option, Options, Uniform, variation_options
@@ -17,12 +19,13 @@ from tca_mj.envs.viewer import NoDisplay, ViewerEnvironment, ViewerPolicy, launc
 from tca_mj.envs.wrappers import RecordRerun, ScaledObservation, VectorScaledObservation
 
 __all__ = [
-    "ArmPickPlace", "ArmPickPlaceVector", "BendReach", "BendReachVector", "Command", "Constant",
-    "Entry", "FingerSense", "FingerSenseVector", "Following", "GaitTask", "HEATINGS", "Headway",
-    "MorphModule", "MorphModuleVector", "NoDisplay", "NoRest", "Option", "Options", "Places",
-    "Recipe", "RecordRerun", "Retelling", "ScaledObservation", "SensedFinger", "SimulatedTask",
-    "StaticTip", "Table", "TaskArguments", "TaskState", "TaskVector", "TetrapodCourse",
-    "TetrapodCourseVector", "TetrapodGait", "TetrapodGaitVector", "Uniform",
-    "VectorScaledObservation", "Verdict", "ViewerEnvironment", "ViewerPolicy", "hang",
-    "hanging_module", "launch", "need_display", "register_task", "variation_options",
+    "AdaptiveGrasp", "AdaptiveGraspVector", "ArmPickPlace", "ArmPickPlaceVector", "BendReach",
+    "BendReachVector", "Command", "Constant", "Entry", "FingerSense", "FingerSenseVector",
+    "Following", "GaitTask", "Grasp", "GraspVector", "HEATINGS", "Headway", "MorphModule",
+    "MorphModuleVector", "NoDisplay", "NoRest", "Option", "Options", "Places", "Recipe",
+    "RecordRerun", "Retelling", "ScaledObservation", "SensedFinger", "SimulatedTask", "StaticTip",
+    "Table", "TaskArguments", "TaskState", "TaskVector", "TetrapodCourse", "TetrapodCourseVector",
+    "TetrapodGait", "TetrapodGaitVector", "Uniform", "VectorScaledObservation", "Verdict",
+    "ViewerEnvironment", "ViewerPolicy", "hang", "hanging_module", "launch", "need_display",
+    "register_task", "variation_options",
 ]  # fmt: skip

@@ -12,11 +12,14 @@ from tca_mj.modules.continuum_leg import LegSpec, continuum_leg
 from tca_mj.modules.finger import FingerPairSpec, finger_pair
 from tca_mj.modules.innervated import InnervatedFingerSpec, innervated_finger
 from tca_mj.modules.morphing import MorphingSpec, morphing_module
+from tca_mj.modules.soft_finger import SoftFingerSpec, soft_finger
 from tca_mj.modules.twisting import TwistingSpec, twisting_module
 from tca_mj.record.film import Film
 from tca_mj.record.recorder import Recorder
 from tca_mj.registry import TASKS, Task, episode_steps, find_task, make, register, task_class
+from tca_mj.robots.adaptive_gripper import AdaptiveGripperSpec, adaptive_gripper
 from tca_mj.robots.arm import ArmSpec, arm
+from tca_mj.robots.gripper import GripperSpec, gripper
 from tca_mj.robots.tetrapod import TetrapodSpec, rigid_tetrapod, tetrapod
 from tca_mj.rod.beam import BeamSpec, Outline
 from tca_mj.routes import Helix, Route, UTurn, leg_length, parallel
@@ -29,15 +32,17 @@ from tca_mj.tca.supply import Supply, Thermostat
 from tca_mj.variation import Nominal, Variation
 
 __version__: str
+
 __all__ = [
-    "ArmSpec", "BeamSpec", "BendingSpec", "CATALOGUE", "Chain", "Drive", "FibreSpec", "Film",
-    "FingerPairSpec", "Group", "Helix", "InnervatedFingerSpec", "LegSpec", "MixedBank",
-    "MixedState", "MorphingSpec", "Muscle", "MuscleBank", "Nominal", "Outline", "Part", "Recorder",
-    "Route", "RoutedTca", "Simulation", "SimulationBatch", "SimulationDiverged",
-    "SimulationOverheated", "SimulationState", "Supply", "TASKS", "Task", "TcaBank", "TcaSpec",
-    "TetrapodSpec", "Thermostat", "TwistingSpec", "UTurn", "Variation", "add_chain", "add_tca",
-    "arm", "bending_module", "continuum_leg", "episode_steps", "export", "find_task", "finger_pair",
-    "frozen", "get_state", "in_arena", "innervated_finger", "leg_length", "make", "morphing_module",
-    "new_spec", "parallel", "register", "register_task", "rigid_tetrapod", "scene", "set_state",
+    "AdaptiveGripperSpec", "ArmSpec", "BeamSpec", "BendingSpec", "CATALOGUE", "Chain", "Drive",
+    "FibreSpec", "Film", "FingerPairSpec", "GripperSpec", "Group", "Helix", "InnervatedFingerSpec",
+    "LegSpec", "MixedBank", "MixedState", "MorphingSpec", "Muscle", "MuscleBank", "Nominal",
+    "Outline", "Part", "Recorder", "Route", "RoutedTca", "Simulation", "SimulationBatch",
+    "SimulationDiverged", "SimulationOverheated", "SimulationState", "SoftFingerSpec", "Supply",
+    "TASKS", "Task", "TcaBank", "TcaSpec", "TetrapodSpec", "Thermostat", "TwistingSpec", "UTurn",
+    "Variation", "adaptive_gripper", "add_chain", "add_tca", "arm", "bending_module",
+    "continuum_leg", "episode_steps", "export", "find_task", "finger_pair", "frozen", "get_state",
+    "gripper", "in_arena", "innervated_finger", "leg_length", "make", "morphing_module", "new_spec",
+    "parallel", "register", "register_task", "rigid_tetrapod", "scene", "set_state", "soft_finger",
     "stage", "task_class", "tetrapod", "twisting_module",
 ]  # fmt: skip

@@ -78,6 +78,16 @@ TASKS = (
         entry_point="tca_mj.envs.finger:FingerSense",
         max_episode_steps=1500,
     ),
+    Task(
+        id="TCA/Grasp-v0",
+        entry_point="tca_mj.envs.grasp:Grasp",
+        max_episode_steps=600,
+    ),
+    Task(
+        id="TCA/AdaptiveGrasp-v0",
+        entry_point="tca_mj.envs.adaptive:AdaptiveGrasp",
+        max_episode_steps=1200,
+    ),
     *(
         Task(
             id=f"TCA/Tetrapod{gait.capitalize()}-v0",
@@ -128,6 +138,8 @@ class Demo(Checked):
 _GUIDED = "tca_mj.agents.scripts.guided"
 _SHOWN = (
     Demo(name="pick-and-place", task="TCA/ArmPickPlace-v0"),
+    Demo(name="grasp", task="TCA/Grasp-v0"),
+    Demo(name="adaptive-grasp", task="TCA/AdaptiveGrasp-v0"),
     Demo(name="tetrapod", task="TCA/TetrapodCourse-v0"),
     Demo(name="finger", task="TCA/FingerSense-v0"),
     *(

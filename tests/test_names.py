@@ -39,15 +39,20 @@ INTERNAL = {
         "sections": "*", "shooting": "*", "solving": "*",
     },
     "tca_mj.model": {"curves": "*", "smooth": "*", "spines": "*", "sums": "*", "surface": "*"},
-    "tca_mj.robots": {"tetrapod": "add_rail attach_legs dress route_spine_tca trunk"},
+    "tca_mj.robots": {
+        "lift": "add_lift", "tetrapod": "add_rail attach_legs dress route_spine_tca trunk",
+    },
+    "tca_mj.modules": {"morphing": "dress"},
     "tca_mj.record": {
         "layout": "*", "plots": "event_rows save_figure", "render": "Closing", "shapes": "*",
     },
     "tca_mj.certify": {"": "*"},
     "tca_mj.validation": {"": "*"},
     "tca_mj.envs": {
-        "command": "command_options commanded drawn", "options": "variation_of",
-        "outcome": "broken_off finite harm how_it_ended measured together", "rewards": "*",
+        "adaptive": "OBJECTS Thing", "command": "command_options commanded drawn",
+        "options": "variation_of",
+        "objects": "*", "outcome": "broken_off finite harm how_it_ended measured together",
+        "rewards": "*",
         "stance": "*", "table": "commands", "task": "parts",
     },
     "tca_mj.agents": {
@@ -59,8 +64,9 @@ INTERNAL = {
     },
     "tca_mj.agents.scripts": {
         # one for each task, found by the task's ``scripted``
-        "arm": "scripted", "finger": "Run calibrate scripted", "morph": "calibrate scripted",
-        "reach": "scripted", "tetrapod": "scripted",
+        "adaptive": "scripted", "arm": "scripted", "finger": "Run calibrate scripted",
+        "grasp": "scripted", "morph": "calibrate scripted", "reach": "scripted",
+        "tetrapod": "scripted",
     },
     "tca_mj.agents.train": {
         "config": "best_algorithm described", "deep": "Run exported film learner record",

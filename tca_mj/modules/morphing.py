@@ -111,7 +111,7 @@ def morphing_module(spec: MorphingSpec | None = None) -> Part:
         mjspec.worldbody, spec.body, nodes=spec.nodes, name="spine", motions=spec.motions,
         rgba=(0.0, 0.0, 0.0, 0.0), collide=False,
     )  # fmt: skip
-    _dress(chain, spec)
+    dress(chain, spec)
     tca = route_tca(mjspec, spec.sheathed, route_passes(chain, spec.route), name="tca")
     spine = route_spine(
         spec.spine, spec.heater, [chain], name="spine", tca="tca", damping_time=spec.damping_time
@@ -128,8 +128,14 @@ def morphing_module(spec: MorphingSpec | None = None) -> Part:
     return Part(mjspec, (tca,), {"tip": "tip"}, (spine,))
 
 
-def _dress(chain: Chain, spec: MorphingSpec) -> None:
-    """What is seen and touched: polymer, protrusions on its inner side, the two legs' tube."""
+def dress(chain: Chain, spec: MorphingSpec, name: str = "") -> None:
+    """What is seen and touched: polymer, protrusions on its inner side, the two legs' tube.
+
+    Args:
+        chain: The module, or a part of it.
+        spec: The module.
+        name: What the names of the geoms begin with.
+    """
     spine, radius = spec.spine, TUBE_DIAMETER / 2.0
     box, cylinder = mujoco.mjtGeom.mjGEOM_BOX, mujoco.mjtGeom.mjGEOM_CYLINDER
     polymer, silicone = [0.86, 0.72, 0.42, 1.0], [0.92, 0.93, 0.95, 0.3]
@@ -139,12 +145,12 @@ def _dress(chain: Chain, spec: MorphingSpec) -> None:
         whole = chain.extent(index)
         middle = whole / 2.0
         piece.add_geom(
-            name=f"polymer{index}", type=box, pos=[0.0, 0.0, middle],
+            name=f"{name}polymer{index}", type=box, pos=[0.0, 0.0, middle],
             size=[spine.width / 2.0, spine.thickness / 2.0, middle], rgba=polymer, **look,
         )  # fmt: skip
         for leg, side in enumerate((-1.0, 1.0)):
             piece.add_geom(
-                name=f"tube{leg}.{index}", type=cylinder, size=[radius, middle, 0.0],
+                name=f"{name}tube{leg}.{index}", type=cylinder, size=[radius, middle, 0.0],
                 pos=[side * spec.half_width, -spine.tca_offset, middle], rgba=silicone, **look,
             )  # fmt: skip
         if index in held:
@@ -152,6 +158,6 @@ def _dress(chain: Chain, spec: MorphingSpec) -> None:
             for leg, side in enumerate((-1.0, 1.0)):
                 across = side * (spine.width / 2.0 - 0.3e-3)
                 piece.add_geom(
-                    name=f"protrusion{leg}.{index}", type=box, size=[0.5e-3, radius, 1.5e-3],
+                    name=f"{name}protrusion{leg}.{index}", type=box, size=[0.5e-3, radius, 1.5e-3],
                     pos=[across, -spine.tca_offset + 0.6e-3, at], rgba=polymer, **look,
                 )  # fmt: skip

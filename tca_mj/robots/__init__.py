@@ -1,6 +1,6 @@
 """Robots, one file each: modules attached to modules.
 
-Two builders have the names of their files: ``from tca_mj.robots.arm import arm`` and
+Most builders have the names of their files: ``from tca_mj.robots.arm import arm``,
 ``from tca_mj.robots.tetrapod import tetrapod``, or ``tca_mj.arm`` and ``tca_mj.tetrapod``.
 """
 

@@ -15,6 +15,7 @@ from tca_mj.validation import (
     creeping,
     drag,
     figures,
+    gripping,
     heat,
     lifting,
     modules,
@@ -45,6 +46,7 @@ _CHAPTERS: dict[str, tuple[tuple[Callable[[], list[Finding]], ...], tuple[str, .
         ("fibre", "statics", "spring", "dynamics", "cone"),
     ),
     "Modules and arm (Chapter 4)": ((modules.findings, touched.findings), ()),
+    "Adaptive gripper (Chapter 6)": ((gripping.findings,), ()),
 }  # fmt: skip
 # Width and height [inches], what draws it, and its caption.
 _FIGURES: dict[str, tuple[float, float, Callable[[Any], None], str]] = {
