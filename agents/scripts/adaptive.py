@@ -41,8 +41,7 @@ class AdaptiveGains(Checked):
 
     Attributes:
         clearance: Distance of each pad from the object before it pinches [m].
-        warm: Temperature of the fingers' TCAs that pinches what weighs nothing: pressed harder
-            than it needs, a ball twists the fingers and rolls out [°C].
+        warm: Temperature of the fingers' TCAs that pinches what weighs nothing [°C].
         per_mass: Rise of that temperature by the object's mass [K/kg].
         warming: Rate at which they are warmed, so that both touch gently [K/s].
         response: Time in which their thermostats would make up for an error [s].
@@ -52,7 +51,8 @@ class AdaptiveGains(Checked):
         set_down: Height at which it is let go [m].
         near: Error of a height that is small enough [m].
         squeeze: Time for which the warm fingers pinch before they lift [s].
-        leaving: Distance between pads and object with which the fingers leave [m].
+        let_go: Temperature of the fingers' TCAs below which they no longer press, so that they can
+            leave without taking along what is light [°C].
         cooling: Longest time that they are given to let go: their tubes stay warm [s].
         phase_limit: Time after which a phase is given up for the next one [s].
 
@@ -71,7 +71,7 @@ class AdaptiveGains(Checked):
     set_down: NotNegative = 0.5e-3
     near: Positive = 0.6e-3
     squeeze: Positive = 1.5
-    leaving: Positive = 1.5e-3
+    let_go: Temperature = 50.0
     cooling: Positive = 60.0
     phase_limit: Positive = 12.0
 
@@ -177,7 +177,6 @@ class AdaptivePolicy(Checked):
         """The phase after this one if its goal is reached, else the same."""
         gains, late = self.gains, self.since > self.gains.phase_limit
         height = float(rows["where to pinch it"][2]) - self._ground
-        gap = float(np.ptp(rows["pads, x and z"][[0, 2]]))
         match self.phase:
             case "lower" if abs(self._missing(rows)) < gains.near or late:
                 return "pinch"
@@ -194,8 +193,7 @@ class AdaptivePolicy(Checked):
             case "set down" if height < gains.set_down + gains.near or late:
                 return "release"
             case "release" if (
-                gap > float(rows["object width"][0]) + 2.0 * gains.leaving
-                or self.since > gains.cooling
+                rows["TCA temperature"][1:].max() < gains.let_go or self.since > gains.cooling
             ):
                 return "done"
         return self.phase
@@ -230,7 +228,7 @@ class AdaptivePolicy(Checked):
                 climb = gains.climb_rate * (goal - height)
                 return float(np.clip(climb, -gains.carry_speed, gains.carry_speed))
             case "done":
-                return gains.carry_speed
+                return 0.5 * self.gripper_spec.lift.speed
             case _:
                 return 0.0
 

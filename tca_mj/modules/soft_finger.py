@@ -24,8 +24,7 @@ from tca_mj.tca.embedding import SILICONE_DENSITY
 
 _RIB = 15e-3  # distance of the ribs that hold the tube; estimate [m]
 # Radius of the two ridges of a pad, which stand for rubber that yields. A ball rests between them,
-# while between flat pads it rolls out as soon as the press times the way from its middle to the
-# fingers' axes passes their stiffness against twist. Estimate [m].
+# while between flat pads it turns the fingers, which twist easily, and rolls out. Estimate [m].
 _RIDGE = 2e-3
 _RUBBER = [0.20, 0.22, 0.25, 1.0]
 
