@@ -50,7 +50,7 @@ def test_robot_task_and_script_take_ninety_lines_at_most():
 def test_the_examples_are_formatted():
     pytest.importorskip("ruff")
     done = subprocess.run(
-        [sys.executable, "-m", "ruff", "format", "--check", str(EXAMPLES)],
+        [sys.executable, "-m", "ruff", "format", "--no-cache", "--check", str(EXAMPLES)],
         capture_output=True, text=True, check=False,
     )  # fmt: skip
     assert done.returncode == 0, done.stdout + done.stderr
