@@ -137,6 +137,7 @@ BY_NAME: dict[str, Any] = {
 }  # fmt: skip
 # The same for single surfaces.
 BY_SURFACE: dict[str, dict[str, Any]] = {
+    "robots.adaptive_gripper.AdaptiveGripperSpec.angle_for": {"gap": 0.04},
     "rod.beam.Outline": {"half_width": 4e-3, "half_height": 4e-3},
     "control.gait.Gait": {
         "offset": (0.0, 0.5), "start": (0.0, 0.5), "duty": (0.5, 0.5), "hot": (150.0, 150.0),
