@@ -32,7 +32,7 @@ _TCAS = (1, 3, 2)  # of base, finger 0 and finger 1, left and right swapped
 
 OBSERVATION = Table(
     [
-        Entry("carriage height", 1, 0.0, 0.6, "m", centre=0.15, scale=0.05),
+        Entry("carriage height", 1, 0.0, 1.2, "m", centre=0.15, scale=0.05),
         Entry("carriage velocity", 1, -1.0, 1.0, "m/s", scale=0.04),
         Entry("spine temperature", 1, -50.0, 400.0, "°C", centre=70.0, scale=50.0),
         Entry("TCA temperature", 3, -50.0, 300.0, "°C", centre=100.0, scale=75.0, mirror=_TCAS),
@@ -41,10 +41,10 @@ OBSERVATION = Table(
         Entry("TCA tension", 3, 0.0, 5.0, "N", centre=0.2, scale=0.2, mirror=_TCAS),
         Entry("angle of the base", 1, -7.0, 7.0, "rad", centre=1.6, scale=1.6),
         Entry("its angular velocity", 1, -200.0, 200.0, "rad/s", scale=2.0),
-        Entry("pads, x and z", 4, -0.6, 0.6, "m", scale=0.1, mirror=(-3, 4, -1, 2)),
+        Entry("pads, x and z", 4, -1.2, 1.2, "m", scale=0.1, mirror=(-3, 4, -1, 2)),
         Entry("object width", 1, 0.0, 0.1, "m", centre=0.04, scale=0.02),
         Entry("object mass", 1, 0.0, 0.5, "kg", centre=6e-3, scale=5e-3),
-        Entry("where to pinch it", 3, -0.6, 0.6, "m", scale=0.1, mirror=(-1, 2, 3)),
+        Entry("where to pinch it", 3, -1.2, 1.2, "m", scale=0.1, mirror=(-1, 2, 3)),
         Entry("object orientation", 4, -1.0, 1.0, "quaternion wxyz", mirror=(1, 2, -3, -4)),
         Entry("object velocity", 3, -10.0, 10.0, "m/s", scale=0.1, mirror=(-1, 2, 3)),
         Entry("time held", 1, 0.0, 10.0, "s", centre=5.0),
