@@ -3,6 +3,7 @@
     python scripts/gait_page.py                               what is missing, then the page
     python scripts/gait_page.py --tasks TCA/TetrapodWalk-v0   of one task; the page of all there is
     python scripts/gait_page.py --page                        the page alone, of what is there
+    python scripts/gait_page.py --commands                    how the shipped walker follows
 
 Runs and evaluations are kept in runs/gaits; a second call goes on where the first one stopped.
 ``docs/gaits.json`` holds the figures of the page, which tests compare with.
@@ -22,15 +23,14 @@ from typing import Any
 import numpy as np
 from scipy import stats
 
-import tca_mj
-from tca_mj.agents.demo import play
 from tca_mj.agents.evaluate import Evaluation, evaluate, figures
 from tca_mj.agents.policies import shipped
+from tca_mj.agents.scripts.guided import WALKER
 from tca_mj.agents.train.config import default_config, described
 from tca_mj.agents.train.deep import EVALUATIONS, train
 from tca_mj.files import write_whole
 from tca_mj.pages import table
-from tca_mj.registry import TASKS
+from tca_mj.registry import DEMOS, TASKS
 
 ROOT = Path(__file__).resolve().parent.parent
 PAGE, DATA = ROOT / "docs" / "gaits.md", ROOT / "docs" / "gaits.json"
@@ -40,7 +40,6 @@ SEEDS = tuple(range(5))  # chosen before anything was trained
 ROBOTS = {"episodes": 16, "seed": 1000, "randomise": 0.2}  # the same for everybody
 NOMINAL = {"episodes": 1, "seed": 0}
 COMMANDED = {"episodes": 2, "seed": 0}
-HALF = 9e-3  # speed of which half is commanded [m/s]
 SHOWN = ("speed", "energy_per_metre", "peak_temperature", "drift")
 LEVEL = 0.95
 
@@ -103,22 +102,24 @@ def trained(task: str, seed: int, out: Path) -> dict[str, Any]:
     }
 
 
-def followed(task: str, policy: str, out: Path) -> dict[str, Any]:
-    """How a policy follows commands: eight directions, two speeds, and the demo of a square."""
-    found: dict[str, Any] = {}
-    fastest = tca_mj.make(task).unwrapped.task.fastest
+def followed() -> list[str]:
+    """How the shipped walker follows commands, as Markdown: nominal robots, seeds 0 and 1."""
+    demo = DEMOS["square"]
     told = {f"{45 * k}°": {"direction": math.remainder(k * math.pi / 4.0, 2.0 * math.pi)}
             for k in range(8)}  # fmt: skip
-    told |= {"half": {"speed": 0.5 * HALF}, "stand": {"speed": 0.0}}
-    assert fastest > HALF
+    told |= {"stand": {"speed": 0.0}, "4.5 mm/s": {"speed": 4.5e-3},
+             "turn left": {"turning": 0.03}, "turn right": {"turning": -0.03}}  # fmt: skip
+    rows, speeds = [], []
     for name, options in told.items():
-        evaluation = Evaluation(task=task, policy=policy, options=options, **COMMANDED)
-        found[name] = figures(evaluate(evaluation, out=out / name)["episodes"])
-    summary = play(
-        task, "tca_mj.agents.scripts.guided:square", arguments={"max_episode_steps": 500},
-        video=False, out=out / "square",
-    )  # fmt: skip
-    return found | {"square": summary["speeds"]}
+        evaluation = Evaluation(task=demo.task, policy=WALKER, options=options, **COMMANDED)
+        found = evaluate(evaluation, progress=False)["figures"]
+        speeds.append(found["speed"]["mean"])
+        astray = math.degrees(found["heading_error"]["most"])
+        rows.append([name, f"{1e3 * speeds[-1]:.2f}", f"{1e3 * found['distance']['mean']:.0f}",
+                     f"{astray:.1f}"])  # fmt: skip
+    rows.append(["mean of the eight directions", f"{1e3 * np.mean(speeds[:8]):.2f}", "", ""])
+    return table(["command", "speed along it [mm/s]", "in 60 s [mm]",
+                  "most off its heading [°]"], rows)  # fmt: skip
 
 
 def of_task(task: str, out: Path) -> dict[str, Any]:
@@ -224,8 +225,12 @@ def main(argv: list[str] | None = None) -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--tasks", nargs="+", choices=GAITS, default=GAITS, metavar="TASK")
     parser.add_argument("--page", action="store_true", help="run nothing")
+    parser.add_argument("--commands", action="store_true", help="how commands are followed, alone")
     parser.add_argument("--out", type=Path, default=ROOT / "runs" / "gaits")
     arguments = parser.parse_args(argv)
+    if arguments.commands:
+        print("\n".join(followed()))
+        return
     results = json.loads(DATA.read_text(encoding="utf-8")) if DATA.is_file() else {}
     for task in [] if arguments.page else arguments.tasks:
         results[task] = of_task(task, arguments.out / name_of(task))
