@@ -32,6 +32,8 @@ class Recipe(Checked):
             of them memories are also told with other commands, and mirrored front for rear.
         discount: What a reward is worth that comes a second later, above 0 up to 1; None for the
             learner's own, per step [1].
+        start: Whose steps come first in the memory: those of a gait, as in ``TrainConfig``, or
+            "random".
         learner: What else differs from the algorithm's defaults, under the names of
             Stable-Baselines3.
         interval: Steps between two points of the learning curve; None for the trainer's own.
@@ -49,5 +51,6 @@ class Recipe(Checked):
     mirrored: bool = False
     growth: Mapping[str, int] = field(default_factory=dict)
     discount: _Discount | None = None
+    start: str = "random"
     learner: Mapping[str, Any] = field(default_factory=dict)
     interval: _Steps | None = None

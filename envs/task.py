@@ -270,6 +270,15 @@ class SimulatedTask(gym.Env[Observation, Action], ABC):
         warm = (command + 1.0) * self._half_range + self._off[: command.size]
         return warm if warm.size == self.sim.n else np.append(warm, self._off[warm.size :])
 
+    def asking(self, temperature: ArrayLike) -> NDArray[np.float64]:
+        """The command by which ``heated`` asks for temperatures; beyond its bounds if they are.
+
+        Args:
+            temperature: Of the first TCAs, where they are what an action says [°C].
+        """
+        wanted = np.asarray(temperature, dtype=np.float64)
+        return (wanted - self._off[: wanted.size]) / self._half_range - 1.0
+
     def prepare(self, setup: Setup) -> None:
         """Begins an episode: resets the simulation and puts everything where it starts.
 

@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import time
+from contextlib import closing, suppress
 from dataclasses import replace
 
 import gymnasium as gym
@@ -105,6 +106,67 @@ def test_a_run_that_is_broken_off_ends_as_one_that_is_not(algorithm, tmp_path, m
     assert any(name.startswith("train/") for name in rows[0])
 
 
+def walking(**change):
+    """Settings under which the script's gait makes the first 40 steps."""
+    learner = replace(REMEMBERED, learning_starts=40)
+    good = {"task": WALK, "scaled": True, "mirrored": True, "start": "scripted", "steps": 80,
+            "interval": 40, "learner": learner, "timestep": 0.0125,
+            "arguments": {"action": "temperature", "control_period": 0.2}}  # fmt: skip
+    return tiny(change.pop("algorithm", "sac"), **good | change)
+
+
+@pytest.mark.usefixtures("quiet")
+def test_a_gait_makes_the_first_steps(tmp_path):
+    config = walking()
+    with closing(Run(config, RunFolder(tmp_path / "run", config, ""))) as run:
+        run.demonstrate()
+        memory, task = run.model.replay_buffer, run.env.venv.tasks.envs[0]
+        assert (memory.size() * memory.n_envs, run.model.num_timesteps) == (40, 40)
+        hot = GAITS["walk"].temperature(np.linspace(0.0, 1.0, 1000))
+        levels = np.stack([hot.min(axis=0), hot.max(axis=0)])  # each TCA is hot or warm
+        told = (memory.actions[:20] + 1.0) / 2.0 * (172.0 - 25.0) + 25.0
+        off = np.abs(told[..., None, :] - levels).min(axis=-2) / ((172.0 - 25.0) / 2.0)
+        assert 0.08 < off.mean() < 0.15  # noise with a spread of 0.15, cut off at 172 °C
+        np.testing.assert_allclose(task.heated(task.asking(hot[0])), hot[0], rtol=1e-13)
+        # In the middle of a cycle some TCAs are hot, others are not, and tasks are not in step.
+        assert (memory.actions[:20].std(axis=(0, 1)) > 0.3).all()
+        assert np.abs(memory.actions[0, 0] - memory.actions[0, 1]).max() > 1.0
+
+
+@pytest.mark.usefixtures("quiet")
+def test_a_run_from_a_gait_goes_on_as_one_that_is_not_broken_off(tmp_path, monkeypatch):
+    config = walking()
+    train(config, tmp_path / "whole", progress=False)
+    step, left = LearningEnv.step_wait, 0
+
+    def breaking(self):
+        nonlocal left
+        left -= 1
+        if left < 0:
+            raise KeyboardInterrupt
+        return step(self)
+
+    monkeypatch.setattr(LearningEnv, "step_wait", breaking)
+    for left in (7, 33, 200):  # amid the gait's steps, amid the learner's  # noqa: B007
+        with suppress(KeyboardInterrupt):
+            train(config, tmp_path / "parts", progress=False)
+    assert written(tmp_path / "parts") == written(tmp_path / "whole")
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"task": QUICK, "mirrored": False},
+        {"scaled": False, "mirrored": False},
+        {"arguments": {"action": "power"}},
+        {"algorithm": "ppo", "learner": LEARNERS["ppo"], "mirrored": False},
+    ],
+)
+def test_a_gait_that_cannot_make_the_first_steps_is_refused(change):
+    with pytest.raises(ValueError, match=r"start|arguments\['action'\]"):
+        walking(**change)
+
+
 SCRIPT = """
 import sys
 from pathlib import Path
@@ -117,8 +179,8 @@ train(TrainConfig(learner=OnPolicy(**eval(sys.argv[2])), **eval(sys.argv[1])), P
 @pytest.mark.usefixtures("quiet")
 def test_a_correction_of_a_gait_goes_on_too(tmp_path, monkeypatch):
     monkeypatch.setattr(gym.spec(WALK), "max_episode_steps", 7)
-    config = tiny("ppo", task=WALK, steps=40, residual=10.0, interval=20, evaluate_every=9,
-                  arguments={"action": "power"})  # fmt: skip
+    config = tiny("ppo", task=WALK, steps=40, residual=10.0, start="scripted", interval=20,
+                  evaluate_every=9, arguments={"action": "power"})  # fmt: skip
     train(config, tmp_path / "whole", progress=False)
     save = Run.save
 

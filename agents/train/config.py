@@ -132,7 +132,9 @@ class TrainConfig(Checked):
             to get on, then wherever it is told.
         residual: Largest correction of a gait's temperatures, which is what is learned then; 0 for
             a policy of its own [K].
-        start: The gait that is corrected: ``scripted``, ``trot``, or a policy's file or name.
+        start: The gait that is corrected, or else that makes the first steps, which memories are
+            filled with before anything is learned: ``scripted``, ``trot``, or a policy's file or
+            name; ``random`` for steps by chance.
         interval: Steps between two rows of the curve, after which the state is written, up to a
             billion.
         evaluate_every: Intervals between two evaluations, up to a million.
@@ -156,7 +158,7 @@ class TrainConfig(Checked):
     retold: bool = False
     growth: Mapping[str, Steps] = field(default_factory=dict)
     residual: Annotated[float, partial(number, at_least=0.0, at_most=50.0, unit="K")] = 0.0
-    start: str = "scripted"
+    start: str = "random"
     interval: Steps = 10_000
     evaluate_every: Many = 2
     evaluation_episodes: Few = 5
@@ -181,6 +183,19 @@ class TrainConfig(Checked):
             raise ValueError(
                 f"residual must be 0 for {self.task}, which has no gait, got {self.residual}"
             )
+        if self.residual and self.start == "random":
+            raise ValueError("start must be a gait where one is corrected, got 'random'")
+        if not self.residual and self.start != "random":
+            if not task.legs or kind is OnPolicy or not self.scaled:
+                raise ValueError(
+                    "start must be 'random' but for a task with legs and memories of scaled"
+                    f" observations, got {shown(self.start)} for {self.task} and {self.algorithm}"
+                )
+            if self.arguments.get("action", "temperature") != "temperature":
+                raise ValueError(
+                    "arguments['action'] must be 'temperature' where a gait makes the first steps,"
+                    f" got {shown(self.arguments)}"
+                )
         if self.residual and self.arguments.get("action") != "power":
             raise ValueError(
                 "arguments['action'] must be 'power' where a gait is corrected, got"
@@ -208,7 +223,9 @@ def default_config(task: str, algorithm: str | None = None, **change: Any) -> Tr
     algorithm = algorithm or best_algorithm(task)
     recipe = known.recipes.get(algorithm, Recipe(steps=_STEPS))
     if change.get("residual"):
-        recipe = Recipe(steps=recipe.steps, action="power", options=recipe.options)
+        recipe = Recipe(
+            steps=recipe.steps, action="power", options=recipe.options, start="scripted"
+        )
     asked = {**change.pop("arguments", {})}
     arguments = {"action": recipe.action} | asked
     period = asked.get("control_period") or recipe.control_period
@@ -225,6 +242,7 @@ def default_config(task: str, algorithm: str | None = None, **change: Any) -> Tr
         "options": options,
         "arguments": arguments,
         "timestep": recipe.timestep,
+        "start": recipe.start,
         "scaled": recipe.scaled,
         "mirrored": recipe.mirrored,
         "retold": recipe.mirrored and bool(growing),
@@ -256,6 +274,7 @@ def described(config: TrainConfig) -> str:
         *(["scaled observations"] if config.scaled else []),
         *(["mirrored memories"] if config.mirrored else []),
         *(["told with other commands"] if config.retold else []),
+        *([f"first steps by the gait '{config.start}'"] if config.start != "random" else []),
         *(f"{name} grown in {steps} steps" for name, steps in config.growth.items()),
         *(f"{name} {value}" for name, value in config.options.items()),
         f"{config.envs} environments", f"seed {config.seed}",

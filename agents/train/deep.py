@@ -36,6 +36,7 @@ from tca_mj.agents.policies.contracts import contract
 from tca_mj.agents.progress import progress_bar
 from tca_mj.agents.rollout import earned, rollout
 from tca_mj.agents.train.config import TrainConfig
+from tca_mj.agents.train.demonstrations import demonstrate
 from tca_mj.agents.train.learning_env import LearningEnv
 from tca_mj.agents.train.mirrored import mirrored_memory
 from tca_mj.agents.train.runs import CURVE, RunFolder, drawn
@@ -77,7 +78,7 @@ def train(
         OSError: If something cannot be written.
         KeyboardInterrupt: As it came; the same call goes on from the last interval.
     """
-    if config.residual:
+    if config.start != "random":
         first_gait(config.task, config.start)  # before a file is touched
     with ExitStack() as ends:
         ends.enter_context(claimed(out))
@@ -89,10 +90,12 @@ def train(
         ends.callback(bar.close)
         if not run.new:
             run.explain()  # the state may be newer, if the run was killed in between
+        if run.new:
+            run.demonstrate()
         left = config.steps - run.model.num_timesteps
         if left > 0:
             # No log of its own, which would empty what the curve takes from the logger.
-            silent: dict[str, Any] = {"log_interval": None, "reset_num_timesteps": run.new}
+            silent: dict[str, Any] = {"log_interval": None, "reset_num_timesteps": False}
             run.model.learn(left, _Watch(run, bar), **silent)
             run.mark(last=True)
         if run.best is None:
@@ -199,6 +202,16 @@ class Run:
             shares = {name: min(1.0, done / steps) for name, steps in config.growth.items()}
             grown = {name: config.options[name] * share for name, share in shares.items()}
             self.env.venv.tasks.reset_options = {**config.options, **grown}
+
+    def demonstrate(self) -> None:
+        """What comes before anything is learned: steps of a gait instead of steps by chance."""
+        config = self.config
+        if config.start == "random" or config.residual:
+            return
+        self.begin()
+        gait, _ = first_gait(config.task, config.start)
+        first = min(config.learner.learning_starts, config.steps)  # type: ignore[union-attr]
+        demonstrate(self.model, self.env.venv.tasks.envs, gait, first, config.seed)
 
     def mark(self, *, last: bool = False) -> None:
         """Adds a row to the curve, evaluates if it is time to, and writes all there is."""

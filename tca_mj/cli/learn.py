@@ -61,8 +61,8 @@ def add_commands(commands: Commands) -> None:
     add(train, "--residual", "correct a gait by at most K kelvin", type=parse_number, metavar="K")
     add(train, "--video", "film the best network at the end; --no-video leaves that for later",
         action=argparse.BooleanOptionalAction, default=True)  # fmt: skip
-    add(train, "--start", "gait to begin with or to correct: scripted (default), trot, a policy's"
-        " file or name", default="scripted", metavar="GAIT")  # fmt: skip
+    add(train, "--start", "gait to begin with or to correct: scripted, trot, a policy's file or"
+        " name, random for none; default: by task, scripted for cma", metavar="GAIT")  # fmt: skip
 
     sweep = add_command(
         commands, "sweep", _sweep, help="evaluate or train at many settings", extra="sweep"
@@ -123,8 +123,9 @@ def _train(arguments: argparse.Namespace) -> int:
       sac, ppo, td3, tqc, crossq
              deep reinforcement learning by Stable-Baselines3, for every task. Without --algo, and
              without other settings, a task is learned by its recipe: what was best of what was
-             tried (docs/training.md). With --residual K the policy of a gait task corrects the
-             temperatures of the gait --start by at most K kelvin.
+             tried (docs/training.md). Of a gait task the gait --start fills the first memories of
+             a learner that has any; with --residual K a policy corrects that gait's temperatures
+             by at most K kelvin.
       cma    searches the figures of a gait on four legs (CMA-ES), from the scripted one, in about
              10 minutes on two cores. Episodes run in --workers processes, on whose number nothing
              depends.
@@ -162,8 +163,8 @@ def _train(arguments: argparse.Namespace) -> int:
     for seed in several or [arguments.seed]:
         out = base / f"seed_{seed}" if several else base
         arguments.kept[:] = [f"the same command goes on with {out}"]
-        given: dict[str, Any] = {"seed": seed, "start": arguments.start}
-        for option in ("steps",) if cma else ("steps", "envs", "residual"):
+        given: dict[str, Any] = {"seed": seed}
+        for option in ("steps", "start") if cma else ("steps", "start", "envs", "residual"):
             if getattr(arguments, option) is not None:
                 given[option] = getattr(arguments, option)
         if cma:
@@ -187,7 +188,7 @@ def _train(arguments: argparse.Namespace) -> int:
 def _command(arguments: argparse.Namespace) -> str:
     """The command of a training run, to be noted."""
     words = ["tca-mj", "train", arguments.task]
-    left_out = {"seed": bool(arguments.seeds), "start": arguments.start == "scripted"}
+    left_out = {"seed": bool(arguments.seeds)}
     for option in ("algo", "steps", "action", "control_period", "envs", "residual", "start",
                    "seeds", "seed"):  # fmt: skip
         value = getattr(arguments, option)

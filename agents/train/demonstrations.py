@@ -1,0 +1,64 @@
+"""First memories of a learner: what a gait does, told as the temperatures that it holds."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from stable_baselines3.common.base_class import BaseAlgorithm
+
+from tca_mj.control import Gait
+from tca_mj.envs.task import SimulatedTask
+
+# What each episode's gait is drawn from, so that memories know more than one way. Estimates: the
+# share by which it is faster or slower, and the spread of what is added to actions from -1 to 1.
+_HURRY, _NOISE = 0.1, 0.15
+
+
+def demonstrate(
+    model: BaseAlgorithm, tasks: list[SimulatedTask], gait: Gait, steps: int, seed: int
+) -> None:
+    """Fills the memory of a new learner with steps of a gait, in place of steps by chance.
+
+    Every episode begins somewhere in the cycle and goes a little faster or slower; every action is
+    a little off. What is asked for is the temperature of the gait in the middle of each step.
+
+    Args:
+        model: An off-policy learner of Stable-Baselines3 with scaled observations.
+        tasks: The tasks that are stepped there, whose actions are temperatures.
+        gait: The gait.
+        steps: Steps of all tasks together.
+        seed: Seed of what is drawn.
+    """
+    env: Any = model.get_env()
+    memory: Any = model.replay_buffer  # type: ignore[attr-defined]
+    random = np.random.default_rng((seed, 2))
+    phase, pace = np.zeros(len(tasks)), np.ones(len(tasks))
+
+    def begin(i: int) -> None:
+        phase[i], pace[i] = random.uniform(), random.uniform(1.0 - _HURRY, 1.0 + _HURRY)
+
+    for i in range(len(tasks)):
+        begin(i)
+    seen = env.reset()
+    while model.num_timesteps < steps:
+        actions = np.stack([
+            _asked(task, gait, phase[i], pace[i]) for i, task in enumerate(tasks)
+        ])  # fmt: skip
+        actions += _NOISE * random.standard_normal(actions.shape)
+        actions = np.clip(actions, -1.0, 1.0).astype(np.float32)
+        after, rewards, dones, infos = env.step(actions)
+        last = after.copy()
+        for i in np.flatnonzero(dones).tolist():
+            last[i] = infos[i]["terminal_observation"]
+            begin(i)
+        memory.add(seen, last, actions, rewards, dones, infos)
+        seen = after
+        model.num_timesteps += len(tasks)
+
+
+def _asked(task: SimulatedTask, gait: Gait, phase: float, pace: float) -> NDArray[np.float64]:
+    """The action that asks for a gait's temperatures in the middle of the coming step."""
+    middle = task.sim.time + 0.5 * task.control_period
+    return task.asking(gait.temperature(phase + pace * middle / gait.period))
