@@ -81,13 +81,20 @@ TASKS = {
 
 # The best of what was tried: docs/gaits.md.
 _LEARNER = {
-    "learning_rate": 1e-3, "batch_size": 256, "tau": 0.01, "ent_coef": "auto_0.05",
-    "learning_starts": 1000, "gradient_steps": 8, "hidden": (128, 128), "buffer_size": 50_000,
+    "learning_rate": 1e-3, "last_rate": 0.1, "batch_size": 256, "tau": 0.01,
+    "ent_coef": "auto_0.05", "learning_starts": 1200, "gradient_steps": 8, "hidden": (128, 128),
+    "buffer_size": 50_000,
 }  # fmt: skip
+# Whose steps come first. The script's crawl moves all legs together, and so would the learner.
+_FIRST = {"crawl": "trot", "walk": "scripted", "shimmy": "scripted"}
 RECIPES = {
-    "sac": Recipe(
-        steps=10_000, control_period=0.5, timestep=10e-3, options={"randomise": 0.2},
-        scaled=True, mirrored=True, growth={"wander": 10_000}, discount=0.94, interval=1000,
-        learner=_LEARNER,
-    ),
+    gait: {
+        "sac": Recipe(
+            steps=15_000, control_period=0.4, timestep=10e-3, options={"randomise": 0.2},
+            scaled=True, mirrored=True, growth={"wander": 8000}, discount=0.94, interval=1000,
+            start=first, learner=_LEARNER,
+        ),
+    }
+    for gait, first in _FIRST.items()
 }  # fmt: skip
+"""By gait and algorithm."""

@@ -129,7 +129,8 @@ class SimulatedTask(gym.Env[Observation, Action], ABC):
         legs: Legs, each with the same TCAs, that a gait can drive; 0 if none can.
         film_speed: Simulated seconds per second of film.
         published_speed: Speeds of the real robot by the stage that shows them [m/s].
-        recipes: How it is learned, by algorithm; the first is what was best.
+        recipes: How it is learned, by algorithm; the first is what was best. ``recipes_for`` says
+            it of a class that is several tasks.
         finer: Finer models of the robot by name: each turns the specification into arguments of
             ``__init__``, the finer specification among them.
         scene: What builds the robot in its scene from its specification.
@@ -269,6 +270,15 @@ class SimulatedTask(gym.Env[Observation, Action], ABC):
         """
         warm = (command + 1.0) * self._half_range + self._off[: command.size]
         return warm if warm.size == self.sim.n else np.append(warm, self._off[warm.size :])
+
+    @classmethod
+    def recipes_for(cls, arguments: Mapping[str, Any]) -> Mapping[str, Recipe]:
+        """The recipes of the task that the class is with some arguments, by algorithm.
+
+        Args:
+            arguments: Those with which the task is registered.
+        """
+        return cls.recipes
 
     def asking(self, temperature: ArrayLike) -> NDArray[np.float64]:
         """The command by which ``heated`` asks for temperatures; beyond its bounds if they are.

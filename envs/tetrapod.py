@@ -4,6 +4,7 @@ fast as it can where nothing else is said (Sun, 6.3.2)."""
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import replace
 from functools import partial
 from typing import Any, ClassVar, Unpack
@@ -24,6 +25,7 @@ from tca_mj.envs.command import (
 from tca_mj.envs.gaits import ACTION, OBSERVATION, RECIPES, TASKS
 from tca_mj.envs.options import Constant, Option, Options, Setup, Uniform, variation_options
 from tca_mj.envs.outcome import Headway, TaskState, Verdict
+from tca_mj.envs.recipe import Recipe
 from tca_mj.envs.stance import CAMERAS, LEG_TCAS, Stance, tetrapod_scene
 from tca_mj.envs.task import SimulatedTask, TaskArguments, parts
 from tca_mj.envs.vector import TaskVector
@@ -118,7 +120,6 @@ class TetrapodGait(SimulatedTask):
     robot_argument = ("robot", TetrapodSpec)
     finer = {"legs": _fine_legs, "fine": _fine_body}
     legs = len(LEGS)
-    recipes = RECIPES
     bend_range: ClassVar[float] = math.radians(1.0)  # largest deviation of the body's bend [rad]
 
     @door
@@ -170,6 +171,11 @@ class TetrapodGait(SimulatedTask):
         self._bend, self._gravity = self.task.bend, (0.0, 0.0, -9.81)
         self._push, self._pushes, self._push_every, self._push_way = 0.0, 0, 1.0, 0.0
         self._try("robot", robot)
+
+    @classmethod
+    def recipes_for(cls, arguments: Mapping[str, Any]) -> Mapping[str, Recipe]:
+        """As every task's; the gaits differ in whose steps come first."""
+        return RECIPES[arguments.get("gait", "walk")]
 
     def _options(self) -> Options:
         task = self.task

@@ -196,6 +196,19 @@ def task_class(task: str) -> Any:
 
 
 @door
+def recipes(task: str) -> Any:
+    """How a task is learned, a ``tca_mj.envs.recipe.Recipe`` by algorithm; the first was best.
+
+    Args:
+        task: Gymnasium id, or ``module:id``.
+
+    Raises:
+        ValueError: As ``task_class``.
+    """
+    return task_class(task).recipes_for(find_task(task).kwargs)
+
+
+@door
 def episode_steps(task: str, control_period: ControlPeriod | None = None) -> int | None:
     """Steps of an episode of a task's own length; None if it has no limit.
 

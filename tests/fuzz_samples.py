@@ -273,7 +273,8 @@ BY_SURFACE: dict[str, dict[str, Any]] = {
     "agents.train.gait_space.GaitSpace.decode": {"point": [0.5] * 28},
     "agents.train.gait_space.GaitSpace.fold": {"point": [0.5] * 28},
     "registry.make": {"task": TASK}, "registry.find_task": {"task": TASK},
-    "registry.task_class": {"task": TASK}, "registry.episode_steps": {"task": TASK},
+    "registry.task_class": {"task": TASK}, "registry.recipes": {"task": TASK},
+    "registry.episode_steps": {"task": TASK},
 }  # fmt: skip
 
 

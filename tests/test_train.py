@@ -34,7 +34,7 @@ QUICK = "TCA/MorphModule-v0"
 GAIT = GAITS["walk"], (STEERING["walk"],) * 4
 WALK = "TCA/TetrapodWalk-v0"
 REMEMBERED = OffPolicy(
-    buffer_size=60, learning_starts=16, gradient_steps=1, batch_size=8, hidden=(8,)
+    buffer_size=60, learning_starts=16, gradient_steps=1, batch_size=8, hidden=(8,), last_rate=0.5
 )
 LEARNERS = {
     "ppo": OnPolicy(n_steps=10, batch_size=20, n_epochs=2, hidden=(8,)),

@@ -10,7 +10,7 @@ from typing import Annotated, Any
 
 from tca_mj.checks import Checked, Positive, Share, door, number, require_one_of, shown, whole
 from tca_mj.envs.recipe import Recipe
-from tca_mj.registry import DEEP, Envs, task_class
+from tca_mj.registry import DEEP, Envs, recipes, task_class
 
 _STEPS = 500_000  # of a run if neither the caller nor the task says: a guess
 
@@ -83,6 +83,8 @@ class OffPolicy(Checked):
         gradient_steps: Gradient steps of each update, up to 10 000.
         batch_size: Of the gradient, up to a million.
         learning_rate: Of Adam, above 0 up to 1 [1].
+        last_rate: Share of it that is left at the end, to which it falls by and by, above 0 up to
+            1 [1].
         gamma: Discount per step, above 0 up to 1 [1].
         tau: Share by which the target network follows, above 0 up to 1 [1]; CrossQ has none.
         ent_coef: Weight of the entropy, 0 to 10 [1]; or ``auto``, or ``auto_`` and the weight to
@@ -101,6 +103,7 @@ class OffPolicy(Checked):
     gradient_steps: Few = 4
     batch_size: Many = 256
     learning_rate: Part = 1e-3
+    last_rate: Part = 1.0
     gamma: Part = 0.98
     tau: Part = 0.01
     ent_coef: Annotated[float | str, _entropy] = "auto"
@@ -221,7 +224,7 @@ def default_config(task: str, algorithm: str | None = None, **change: Any) -> Tr
         require_one_of("change", name, [field.name for field in fields(TrainConfig)])
     known = task_class(task)
     algorithm = algorithm or best_algorithm(task)
-    recipe = known.recipes.get(algorithm, Recipe(steps=_STEPS))
+    recipe = recipes(task).get(algorithm, Recipe(steps=_STEPS))
     if change.get("residual"):
         recipe = Recipe(
             steps=recipe.steps, action="power", options=recipe.options, start="scripted"
@@ -255,7 +258,7 @@ def default_config(task: str, algorithm: str | None = None, **change: Any) -> Tr
 
 def best_algorithm(task: str) -> str:
     """The algorithm that is best for a task, as far as that was tried; errors as ``task_class``."""
-    return next(iter(task_class(task).recipes), DEEP[0])
+    return next(iter(recipes(task)), DEEP[0])
 
 
 def described(config: TrainConfig) -> str:
@@ -280,7 +283,7 @@ def described(config: TrainConfig) -> str:
         f"{config.envs} environments", f"seed {config.seed}",
     ]  # fmt: skip
     text = ", ".join(words)
-    recipe = task.recipes.get(config.algorithm)
+    recipe = recipes(config.task).get(config.algorithm)
     if power and period < 0.3 and not config.residual and not (recipe and recipe.action == "power"):
         text += (
             f"\nwarning: power that changes every {period:g} s is noise to a TCA, which takes"

@@ -14,7 +14,7 @@ import pickle
 import random
 import shutil
 from contextlib import ExitStack, closing
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -323,6 +323,17 @@ class _Watch(BaseCallback):
         return True
 
 
+@dataclass(frozen=True)
+class _Falling:
+    """A rate that falls to a share of it, as a function of the share of the run that is left."""
+
+    first: float
+    last: float
+
+    def __call__(self, left: float) -> float:
+        return self.first * (self.last + (1.0 - self.last) * left)
+
+
 def learner(config: TrainConfig, env: VecEnv) -> BaseAlgorithm:
     """A new model of Stable-Baselines3.
 
@@ -334,6 +345,8 @@ def learner(config: TrainConfig, env: VecEnv) -> BaseAlgorithm:
     network: dict[str, Any] = {"net_arch": list(settings["hidden"])}
     if "log_std_init" in settings:
         network["log_std_init"] = settings["log_std_init"]
+    if settings.get("last_rate", 1.0) < 1.0:
+        settings["learning_rate"] = _Falling(settings["learning_rate"], settings["last_rate"])
     if kind is TD3:
         n = env.action_space.shape or (1,)
         settings["action_noise"] = NormalActionNoise(np.zeros(n), np.full(n, settings["noise"]))

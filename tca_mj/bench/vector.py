@@ -32,7 +32,7 @@ from tca_mj.envs.task import SimulatedTask
 from tca_mj.envs.vector import TaskVector
 from tca_mj.machine import machine, versions
 from tca_mj.pages import made_with, page, table, write_result
-from tca_mj.registry import TASKS, task_class
+from tca_mj.registry import TASKS, recipes
 
 # What is aimed at: steps per second on two threads over those on one, and on one thread over those
 # of single environments; for tasks whose physics is most of the work.
@@ -71,7 +71,7 @@ def benchmark(
         "tasks": {}, "training": {}, "by_recipe": {}, "left_out": {},
     }  # fmt: skip
     chosen = list(ids) or [task.id for task in TASKS]
-    trained = next((id for id in chosen if task_class(id).recipes), chosen[0])
+    trained = next((id for id in chosen if recipes(id)), chosen[0])
     with progress_bar(len(chosen) + 1, unit="tasks", leave=False) as bar:
         for id in [*chosen, _PEER]:
             with _if_installed(id, result):
@@ -79,8 +79,8 @@ def benchmark(
             bar.update()
     with _if_installed("training", result):
         result["training"] = _training(trained, max(int(1024 * scale), 64), min(n, 8))
-    recipes = (id for id in chosen if any(r.scaled for r in task_class(id).recipes.values()))
-    by_recipe = next(recipes, None)
+    held = (id for id in chosen if any(recipe.scaled for recipe in recipes(id).values()))
+    by_recipe = next(held, None)
     if by_recipe is not None:
         with _if_installed("by_recipe", result):
             result["by_recipe"] = _by_recipe(by_recipe, max(int(800 * scale), 64))
