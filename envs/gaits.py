@@ -15,6 +15,8 @@ _FEET = (4, -5, 6, 1, -2, 3, 10, -11, 12, 7, -8, 9)  # and the places of their f
 _ENDS = (7, 9, 8, 10, 12, 11, 1, 3, 2, 4, 6, 5)  # front and rear swapped, of TCAs
 _ENDS_FEET = (-7, 8, 9, -10, 11, 12, -1, 2, 3, -4, 5, 6)  # and feet
 
+FAR = 10.0  # way ahead or aside from which on it is seen as this [m]
+
 OBSERVATION = Table(
     [
         Entry("TCA temperature", LEG_TCAS, -50.0, 300.0, "°C", centre=100.0, scale=75.0,
@@ -35,8 +37,8 @@ OBSERVATION = Table(
         Entry("body bend", 1, -6.3, 6.3, "rad"),
         Entry("commanded direction", 2, -1.0, 1.0, "-", mirror=(1, -2), ends=(-1, 2)),
         Entry("commanded speed", 1, 0.0, 1.0, "m/s", centre=0.01, scale=0.01),
-        Entry("lead", 1, -10.0, 10.0, "m", scale=0.02),
-        Entry("way aside", 1, -10.0, 10.0, "m", scale=0.05, mirror=(-1,), ends=(-1,)),
+        Entry("lead", 1, -FAR, FAR, "m", scale=0.02),
+        Entry("way aside", 1, -FAR, FAR, "m", scale=0.05, mirror=(-1,), ends=(-1,)),
         Entry("commanded turning", 1, -1.0, 1.0, "rad/s", scale=0.05, mirror=(-1,), ends=(-1,)),
         Entry("heading error", 1, -3.2, 3.2, "rad", scale=0.3, mirror=(-1,), ends=(-1,)),
     ]
@@ -85,16 +87,17 @@ _LEARNER = {
     "ent_coef": "auto_0.05", "learning_starts": 1200, "gradient_steps": 8, "hidden": (128, 128),
     "buffer_size": 50_000,
 }  # fmt: skip
-# Whose steps come first. The script's crawl moves all legs together, and so would the learner.
-_FIRST = {"crawl": "trot", "walk": "scripted", "shimmy": "scripted"}
+# After how many decisions it was learned, and whose steps come first: the script's crawl moves all
+# legs together, and so would the learner.
+_LEARNED = {"crawl": (6000, "trot"), "walk": (12_000, "scripted"), "shimmy": (12_000, "scripted")}
 RECIPES = {
     gait: {
         "sac": Recipe(
-            steps=15_000, control_period=0.4, timestep=10e-3, options={"randomise": 0.2},
-            scaled=True, mirrored=True, growth={"wander": 8000}, discount=0.94, interval=1000,
+            steps=steps, control_period=0.4, timestep=10e-3, options={"randomise": 0.2},
+            scaled=True, mirrored=True, growth={"wander": 8000}, discount=0.94, interval=1500,
             start=first, learner=_LEARNER,
         ),
     }
-    for gait, first in _FIRST.items()
+    for gait, (steps, first) in _LEARNED.items()
 }  # fmt: skip
 """By gait and algorithm."""

@@ -54,6 +54,7 @@ _HALF_HEIGHT, _TRAY = 4.5e-3, 10e-3  # of assets/mjcf/block.xml and tray.xml [m]
 _LIFTED = 6e-3  # height above the tray at which an object counts as held [m]
 _ASIDE = 1e-3  # largest offset of the object in x and in y [m]
 _DAMPING = 5e-3  # Kelvin-Voigt time of the object's sides [s]
+_LOST = 0.1  # distance from below the gripper at which it is out of reach [m]
 _FREE = 0.3  # time untouched after which an object is let go [s]
 
 
@@ -109,8 +110,9 @@ class Grasp(SimulatedTask):
     are the times. ``options`` is the table of all that can be given.
 
     Terminates when the object has been let go within 6 s of the commanded time (success), when it
-    is not held when it should be, or not let go in time. Truncates after the time limit, and with
-    ``info["truncation_reason"]`` if the TCA is too hot or torn, or if the simulation diverged.
+    is not held when it should be, not let go in time or out of reach. Truncates after the time
+    limit, and with ``info["truncation_reason"]`` if the TCA is too hot or torn, or if the
+    simulation diverged.
     """
 
     max_power: ClassVar[float] = 10.0  # Sun, Section 4.1.4 [W]
@@ -242,6 +244,8 @@ class Grasp(SimulatedTask):
             success = self._untouched > _FREE - 1e-9 and not harmed
             late = now > self.hold_until + self.release_time + 1e-9
             ended = f"not let go at {now:.1f} s" if late and not success else None
+        if math.hypot(*self.data.xpos[self._bodies[0], :2]) > _LOST and not success:
+            ended = ended or "object out of reach"
         terms["hold"] = 10.0 * self.interval / due if wanted and held else 0.0
         terms["goal"] = 20.0 if success else 0.0
         return Verdict(terms=terms, success=success, ended=None if harmed else ended)

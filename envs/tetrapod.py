@@ -22,7 +22,7 @@ from tca_mj.envs.command import (
     commanded,
     drawn,
 )  # fmt: skip
-from tca_mj.envs.gaits import ACTION, OBSERVATION, RECIPES, TASKS
+from tca_mj.envs.gaits import ACTION, FAR, OBSERVATION, RECIPES, TASKS
 from tca_mj.envs.options import Constant, Option, Options, Setup, Uniform, variation_options
 from tca_mj.envs.outcome import Headway, TaskState, Verdict
 from tca_mj.envs.recipe import Recipe
@@ -40,6 +40,7 @@ _SETTLING = 0.5  # time in which the robot comes to rest after it is put down [s
 _UPRIGHT = 0.5  # cosine of the tilt from which on it has fallen over
 _STEEPEST = math.radians(10.0)  # largest slope of the ground [rad]
 _GOLDEN = math.radians(137.5)  # angle between two pushes: they come from all sides
+_SLID = 0.5  # speed at which it slides down a slope, fifty times what it walks [m/s]
 _SUNK = 12e-3  # depth below its first height at which it has fallen off the beam [m]
 
 
@@ -95,9 +96,9 @@ class TetrapodGait(SimulatedTask):
     be given: commands, a slope, pushes, and by how much the robot is off. On a slope it is gravity
     that is tilted, so that the world's z stays that of the ground.
 
-    Terminates with ``info["termination_reason"]`` when the robot has fallen over or off the beam.
-    Truncates after the time limit, and with ``info["truncation_reason"]`` if a TCA is too hot or
-    torn, or if the simulation diverged.
+    Terminates with ``info["termination_reason"]`` when the robot has fallen over or off the beam,
+    or slides down a slope. Truncates after the time limit, and with ``info["truncation_reason"]``
+    if a TCA is too hot or torn, or if the simulation diverged.
 
     Example:
         >>> from tca_mj.envs import TetrapodGait
@@ -321,9 +322,11 @@ class TetrapodGait(SimulatedTask):
         return Verdict(terms=terms, ended=self._fallen(tilt), seen=self._told())
 
     def _fallen(self, tilt: float) -> str | None:
-        """How the robot has fallen, or None."""
+        """How the robot has fallen or slid, or None."""
         if tilt > 1.0 - _UPRIGHT:
             return "fell over"
+        if math.hypot(*self.stance.velocity(self.data)[0][:2]) > _SLID:
+            return "slid away"
         if self.task.beam and self.stance.position(self.data)[2] < self._first - _SUNK:
             return "fell off the beam"
         return None
@@ -354,8 +357,8 @@ class TetrapodGait(SimulatedTask):
         return {
             "commanded direction": course @ self.stance.rotation(self.data)[:2, :2],
             "commanded speed": min(now.command.speed, self.task.fastest),
-            "lead": now.lead,
-            "way aside": now.aside,
+            "lead": min(now.lead, FAR),
+            "way aside": min(max(now.aside, -FAR), FAR),
             "commanded turning": now.command.turning,
             "heading error": now.error,
         }
