@@ -89,12 +89,12 @@ _LEARNER = {
 }  # fmt: skip
 # After how many decisions it was learned, and whose steps come first: the script's crawl moves all
 # legs together, and so would the learner.
-_LEARNED = {"crawl": (6000, "trot"), "walk": (12_000, "scripted"), "shimmy": (12_000, "scripted")}
+_LEARNED = {"crawl": (6000, "trot"), "walk": (15_000, "scripted"), "shimmy": (12_000, "scripted")}
 RECIPES = {
     gait: {
         "sac": Recipe(
             steps=steps, control_period=0.4, timestep=10e-3, options={"randomise": 0.2},
-            scaled=True, mirrored=True, growth={"wander": 8000}, discount=0.94, interval=1500,
+            scaled=True, mirrored=True, growth={"wander": 8000}, discount=0.94, interval=1000,
             start=first, learner=_LEARNER,
         ),
     }
