@@ -92,6 +92,7 @@ _FREE = 0.3  # time untouched after which it is let go [s]
 # follow it [m].
 _ASIDE = np.array([2e-3, 0.5e-3])
 _LOST = 0.12  # distance from the middle at which it is out of reach [m]
+_FOLDED = 1.5  # angle of a finger's joint at which it is crushed against something [rad]
 _CLEAR = 0.2e-3  # height above the table of what is parked, so that nothing touches [m]
 
 
@@ -153,9 +154,10 @@ class AdaptiveGrasp(SimulatedTask):
     Reset: everything is cold, the base fixed in some angle above the object. ``options`` is the
     table of all that can be given.
 
-    Terminates when the object, having been held for 10 s, has been let go (success) or is out of
-    reach. Truncates after the time limit, and with ``info["truncation_reason"]`` if the base's TCA
-    is damaged, a TCA too hot or torn, the spine too hot, or if the simulation diverged.
+    Terminates when the object, having been held for 10 s, has been let go (success), when it is out
+    of reach, or when a finger is folded by being pressed on something. Truncates after the time
+    limit, and with ``info["truncation_reason"]`` if the base's TCA is damaged, a TCA too hot or
+    torn, the spine too hot, or if the simulation diverged.
     """
 
     max_voltage = 25.0  # Sun, Section 6.1.3 [V]
@@ -218,6 +220,8 @@ class AdaptiveGrasp(SimulatedTask):
         bends = [i for i, name in enumerate(names) if name.startswith("gripper.base.half")
                  and ".bend_x" in name]  # fmt: skip
         self._bend_q, self._bend_v = model.jnt_qposadr[bends], model.jnt_dofadr[bends]
+        fingers = [i for i, name in enumerate(names) if name.startswith("gripper.finger")]
+        self._fingers_q = model.jnt_qposadr[fingers]
         self._pads = [int(model.site(f"gripper.finger{i}.pad").id) for i in range(SIDES)]
         self._is_hand = named(model, "gripper.finger")
         self._is_object = {name: named(model, f"{name}.") for name in OBJECTS}
@@ -297,11 +301,16 @@ class AdaptiveGrasp(SimulatedTask):
         success = self._kept and self._untouched > _FREE - 1e-9 and not harmed
         terms["goal"] = 20.0 if success else 0.0
         terms["damage"] = -10.0 if some(self.sim.spines.damaged) else 0.0
-        lost = bool(np.hypot(*self._place()[:2]) > _LOST)
         return Verdict(
             terms=terms, success=success, seen={"time held": self._time_held()},
-            ended="object out of reach" if lost and not (success or harmed) else None,
+            ended=None if success or harmed else self._lost(),
         )  # fmt: skip
+
+    def _lost(self) -> str | None:
+        """Why nothing can be grasped any more, or None."""
+        if np.abs(self.data.qpos[self._fingers_q]).max() > _FOLDED:
+            return "finger crushed"
+        return "object out of reach" if np.hypot(*self._place()[:2]) > _LOST else None
 
     def _place(self) -> NDArray[np.float64]:
         start = self._free_q[self.object]
