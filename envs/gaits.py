@@ -89,7 +89,7 @@ _LEARNER = {
 }  # fmt: skip
 # After how many decisions it was learned, and whose steps come first: the script's crawl moves all
 # legs together, and so would the learner.
-_LEARNED = {"crawl": (6000, "trot"), "walk": (15_000, "scripted"), "shimmy": (12_000, "scripted")}
+_LEARNED = {"crawl": (6000, "trot"), "walk": (15_000, "scripted"), "shimmy": (16_000, "scripted")}
 RECIPES = {
     gait: {
         "sac": Recipe(
