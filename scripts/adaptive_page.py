@@ -4,7 +4,6 @@
     python scripts/adaptive_page.py --tables           prints the table; some minutes of one core
 """
 
-import argparse
 import math
 from pathlib import Path
 from typing import Any
@@ -52,12 +51,12 @@ def run(name: str, seed: int, base: str) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def table(workers: int) -> str:
+def table() -> str:
     """How the script does, with the base and without, as Markdown."""
     cases = [(name, seed, base) for base, seeds in SEEDS.items() for name in OBJECTS
              for seed in range(seeds)]  # fmt: skip
     found: dict[int, dict[str, Any]] = {}
-    with Workers(workers) as processes, progress_bar(len(cases), unit="episodes") as bar:
+    with Workers(2) as processes, progress_bar(len(cases), unit="episodes") as bar:
         for place, row in processes.run(run, cases):
             found[place] = row
             bar.update()
@@ -106,16 +105,12 @@ def picture(path: Path) -> None:
     imageio.imwrite(path, np.concatenate(rows))
 
 
-def main(argv: list[str] | None = None) -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--out", type=Path, default=Path("docs/pictures"))
-    parser.add_argument("--tables", action="store_true")
-    parser.add_argument("--workers", type=int, default=2, help="processes")
-    arguments = parser.parse_args(argv)
-    if arguments.tables:
-        print(table(arguments.workers), flush=True)
+def main() -> None:
+    out = pages.folder_of_pictures(__doc__, Path("docs/pictures"))
+    if out is None:
+        print(table(), flush=True)
     else:
-        picture(arguments.out / "adaptive-grasp.png")
+        picture(out / "adaptive-grasp.png")
 
 
 if __name__ == "__main__":

@@ -4,7 +4,6 @@
     python scripts/finger_page.py --tables    prints the tables; takes some minutes
 """
 
-import argparse
 import math
 from pathlib import Path
 
@@ -13,6 +12,7 @@ import numpy as np
 
 from tca_mj.agents.scripts.finger import TRIGGER, FingerPolicy, bending_run
 from tca_mj.envs.finger import FingerSense
+from tca_mj.pages import folder_of_pictures
 from tca_mj.record.plots import save_figure
 from tca_mj.tca.sensing.wire import fit_displacement
 from tca_mj.validation.touched import SETTLED, TARGET, answer
@@ -139,17 +139,14 @@ def picture(path: Path) -> None:
     imageio.imwrite(path, np.concatenate([p for p in panels if p is not None], axis=1))
 
 
-def main(argv: list[str] | None = None) -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--out", type=Path, default=Path("docs/pictures"))
-    parser.add_argument("--tables", action="store_true")
-    arguments = parser.parse_args(argv)
-    if arguments.tables:
+def main() -> None:
+    out = folder_of_pictures(__doc__, Path("docs/pictures"))
+    if out is None:
         for table in (touches, supplies, episodes):
             print(table(), flush=True, end="\n\n")
     else:
-        plot(arguments.out / "finger_answer.png")
-        picture(arguments.out / "finger.png")
+        plot(out / "finger_answer.png")
+        picture(out / "finger.png")
 
 
 if __name__ == "__main__":

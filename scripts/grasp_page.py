@@ -4,7 +4,6 @@
     python scripts/grasp_page.py --tables           prints the tables; about a minute of one core
 """
 
-import argparse
 import math
 from pathlib import Path
 from typing import Any
@@ -47,11 +46,11 @@ def spread_of(values: list[float], digits: int = 0) -> str:
     return f"{middle:.{digits}f} ({min(values):.{digits}f} to {max(values):.{digits}f})"
 
 
-def episodes(workers: int) -> str:
+def episodes() -> str:
     """How the script does, as Markdown."""
     cases = [(seed, spread) for spread in (0.0, 0.2) for seed in SEEDS]
     found: dict[int, dict[str, Any]] = {}
-    with Workers(workers) as processes, progress_bar(len(cases), unit="episodes") as bar:
+    with Workers(2) as processes, progress_bar(len(cases), unit="episodes") as bar:
         for place, row in processes.run(run, cases):
             found[place] = row
             bar.update()
@@ -102,16 +101,12 @@ def picture(path: Path) -> None:
     imageio.imwrite(path, np.concatenate(list(panels.values()), axis=1))
 
 
-def main(argv: list[str] | None = None) -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--out", type=Path, default=Path("docs/pictures"))
-    parser.add_argument("--tables", action="store_true")
-    parser.add_argument("--workers", type=int, default=2, help="processes")
-    arguments = parser.parse_args(argv)
-    if arguments.tables:
-        print(forces(), episodes(arguments.workers), sep="\n\n", flush=True)
+def main() -> None:
+    out = pages.folder_of_pictures(__doc__, Path("docs/pictures"))
+    if out is None:
+        print(forces(), episodes(), sep="\n\n", flush=True)
     else:
-        picture(arguments.out / "grasp.png")
+        picture(out / "grasp.png")
 
 
 if __name__ == "__main__":

@@ -4,7 +4,6 @@
     python scripts/reach_page.py --tables           prints the tables; takes four minutes
 """
 
-import argparse
 import itertools
 import math
 from collections.abc import Callable
@@ -18,6 +17,7 @@ from tca_mj.agents.scripts.reach import ReachPolicy
 from tca_mj.envs.hanging import NoRest, StaticTip
 from tca_mj.envs.reach import ACTION, BendReach
 from tca_mj.modules.bending import BendingSpec
+from tca_mj.pages import folder_of_pictures
 from tca_mj.sim import SimulationDiverged
 
 Act = Callable[[Any], Any]
@@ -118,15 +118,12 @@ def picture(path: Path) -> None:
     imageio.imwrite(path, np.concatenate([p for p in panels if p is not None], axis=1))
 
 
-def main(argv: list[str] | None = None) -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--out", type=Path, default=Path("docs/pictures"))
-    parser.add_argument("--tables", action="store_true")
-    arguments = parser.parse_args(argv)
-    if arguments.tables:
+def main() -> None:
+    out = folder_of_pictures(__doc__, Path("docs/pictures"))
+    if out is None:
         print(baselines(), history(), sep="\n\n", flush=True)
     else:
-        picture(arguments.out / "reach.png")
+        picture(out / "reach.png")
 
 
 if __name__ == "__main__":
