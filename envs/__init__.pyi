@@ -6,6 +6,7 @@ from tca_mj.envs.finger import FingerSense, FingerSenseVector, SensedFinger
 from tca_mj.envs.gaits import GaitTask
 from tca_mj.envs.grasp import Grasp, GraspVector
 from tca_mj.envs.hanging import NoRest, StaticTip, hang
+from tca_mj.envs.jump import Jump, JumpVector
 from tca_mj.envs.morph import MorphModule, MorphModuleVector, hanging_module
 from tca_mj.envs.options import Constant, Option, Options, Uniform, variation_options
 from tca_mj.envs.outcome import Headway, TaskState, Verdict
@@ -21,11 +22,11 @@ from tca_mj.envs.wrappers import RecordRerun, ScaledObservation, VectorScaledObs
 __all__ = [
     "AdaptiveGrasp", "AdaptiveGraspVector", "ArmPickPlace", "ArmPickPlaceVector", "BendReach",
     "BendReachVector", "Command", "Constant", "Entry", "FingerSense", "FingerSenseVector",
-    "Following", "GaitTask", "Grasp", "GraspVector", "HEATINGS", "Headway", "MorphModule",
-    "MorphModuleVector", "NoDisplay", "NoRest", "Option", "Options", "Places", "Recipe",
-    "RecordRerun", "Retelling", "ScaledObservation", "SensedFinger", "SimulatedTask", "StaticTip",
-    "Table", "TaskArguments", "TaskState", "TaskVector", "TetrapodCourse", "TetrapodCourseVector",
-    "TetrapodGait", "TetrapodGaitVector", "Uniform", "VectorScaledObservation", "Verdict",
-    "ViewerEnvironment", "ViewerPolicy", "hang", "hanging_module", "launch", "need_display",
-    "register_task", "variation_options",
+    "Following", "GaitTask", "Grasp", "GraspVector", "HEATINGS", "Headway", "Jump", "JumpVector",
+    "MorphModule", "MorphModuleVector", "NoDisplay", "NoRest", "Option", "Options", "Places",
+    "Recipe", "RecordRerun", "Retelling", "ScaledObservation", "SensedFinger", "SimulatedTask",
+    "StaticTip", "Table", "TaskArguments", "TaskState", "TaskVector", "TetrapodCourse",
+    "TetrapodCourseVector", "TetrapodGait", "TetrapodGaitVector", "Uniform",
+    "VectorScaledObservation", "Verdict", "ViewerEnvironment", "ViewerPolicy", "hang",
+    "hanging_module", "launch", "need_display", "register_task", "variation_options",
 ]  # fmt: skip

@@ -8,6 +8,7 @@ from tca_mj.model.part import Part, new_spec
 from tca_mj.model.scene import in_arena, scene
 from tca_mj.model.tendon import RoutedTca
 from tca_mj.modules.bending import BendingSpec, bending_module
+from tca_mj.modules.bistable import BistableSpec, bistable_module
 from tca_mj.modules.continuum_leg import LegSpec, continuum_leg
 from tca_mj.modules.finger import FingerPairSpec, finger_pair
 from tca_mj.modules.innervated import InnervatedFingerSpec, innervated_finger
@@ -20,10 +21,11 @@ from tca_mj.registry import TASKS, Task, episode_steps, find_task, make, registe
 from tca_mj.robots.adaptive_gripper import AdaptiveGripperSpec, adaptive_gripper
 from tca_mj.robots.arm import ArmSpec, arm
 from tca_mj.robots.gripper import GripperSpec, gripper
+from tca_mj.robots.jumper import JumperSpec, jumper
 from tca_mj.robots.tetrapod import TetrapodSpec, rigid_tetrapod, tetrapod
 from tca_mj.rod.beam import BeamSpec, Outline
 from tca_mj.routes import Helix, Route, UTurn, leg_length, parallel
-from tca_mj.sim import Drive, Simulation, SimulationDiverged, SimulationOverheated
+from tca_mj.sim import Drive, Haste, Simulation, SimulationDiverged, SimulationOverheated
 from tca_mj.state import SimulationState, get_state, set_state
 from tca_mj.tca.bank import TcaBank
 from tca_mj.tca.catalogue import CATALOGUE
@@ -34,15 +36,16 @@ from tca_mj.variation import Nominal, Variation
 __version__: str
 
 __all__ = [
-    "AdaptiveGripperSpec", "ArmSpec", "BeamSpec", "BendingSpec", "CATALOGUE", "Chain", "Drive",
-    "FibreSpec", "Film", "FingerPairSpec", "GripperSpec", "Group", "Helix", "InnervatedFingerSpec",
-    "LegSpec", "MixedBank", "MixedState", "MorphingSpec", "Muscle", "MuscleBank", "Nominal",
-    "Outline", "Part", "Recorder", "Route", "RoutedTca", "Simulation", "SimulationBatch",
-    "SimulationDiverged", "SimulationOverheated", "SimulationState", "SoftFingerSpec", "Supply",
-    "TASKS", "Task", "TcaBank", "TcaSpec", "TetrapodSpec", "Thermostat", "TwistingSpec", "UTurn",
-    "Variation", "adaptive_gripper", "add_chain", "add_tca", "arm", "bending_module",
-    "continuum_leg", "episode_steps", "export", "find_task", "finger_pair", "frozen", "get_state",
-    "gripper", "in_arena", "innervated_finger", "leg_length", "make", "morphing_module", "new_spec",
+    "AdaptiveGripperSpec", "ArmSpec", "BeamSpec", "BendingSpec", "BistableSpec", "CATALOGUE",
+    "Chain", "Drive", "FibreSpec", "Film", "FingerPairSpec", "GripperSpec", "Group", "Haste",
+    "Helix", "InnervatedFingerSpec", "JumperSpec", "LegSpec", "MixedBank", "MixedState",
+    "MorphingSpec", "Muscle", "MuscleBank", "Nominal", "Outline", "Part", "Recorder", "Route",
+    "RoutedTca", "Simulation", "SimulationBatch", "SimulationDiverged", "SimulationOverheated",
+    "SimulationState", "SoftFingerSpec", "Supply", "TASKS", "Task", "TcaBank", "TcaSpec",
+    "TetrapodSpec", "Thermostat", "TwistingSpec", "UTurn", "Variation", "adaptive_gripper",
+    "add_chain", "add_tca", "arm", "bending_module", "bistable_module", "continuum_leg",
+    "episode_steps", "export", "find_task", "finger_pair", "frozen", "get_state", "gripper",
+    "in_arena", "innervated_finger", "jumper", "leg_length", "make", "morphing_module", "new_spec",
     "parallel", "register", "register_task", "rigid_tetrapod", "scene", "set_state", "soft_finger",
     "stage", "task_class", "tetrapod", "twisting_module",
 ]  # fmt: skip

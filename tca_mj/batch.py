@@ -76,6 +76,7 @@ class SimulationBatch(Held):
         self._tendon_length, self._tendon_slope = (
             self.physics.bind(name) for name in ("ten_length", "ten_J")
         )
+        self._speeds = self.physics.bind("qvel")
         self._body = SmoothBody.batch([sim.body for sim in self.sims])
         self._parts: list[Any] = []
         self._bank: Any = None
@@ -161,6 +162,8 @@ class SimulationBatch(Held):
         batch.forward(which, _POSITIONS)
         astray = np.zeros(len(ids), dtype=bool)
         for left in reversed(range(updates)):
+            if sims[0].haste is not None:  # what snaps may take steps of its own
+                astray |= [sim.snaps(v) for sim, v in zip(sims, self._speeds[rows], strict=True)]
             astray |= every.advance(batch.qpos[rows])
             every.hand_over(
                 np.flatnonzero(~astray),
@@ -171,8 +174,8 @@ class SimulationBatch(Held):
             batch.set_models(self._models)  # which were written to
             batch.step(which, sims[0].substeps, _POSITIONS if left else _NOTHING)
         astray |= (batch.warning[rows][:, list(DIVERGENCE), 1] > 0).any(axis=-1)
-        for name in ("qpos", "qvel"):
-            astray |= ~np.isfinite(batch.bind(name)[rows]).all(axis=-1)
+        for values in (batch.qpos, self._speeds):
+            astray |= ~np.isfinite(values[rows]).all(axis=-1)
         every.locate(batch.qpos[rows])
         for k in np.flatnonzero(~astray):
             batch.get_data(int(ids[k]), sims[k].data)
@@ -189,6 +192,7 @@ def _alike(first: Simulation, other: Simulation) -> bool:
         and (first.bank.law, first.bank.specs) == (other.bank.law, other.bank.specs)
         and np.array_equal(first.length_offset, other.length_offset)
         and first.bank.supply.like(other.bank.supply)
+        and first.haste == other.haste
     )
 
 

@@ -88,6 +88,11 @@ TASKS = (
         entry_point="tca_mj.envs.adaptive:AdaptiveGrasp",
         max_episode_steps=1200,
     ),
+    Task(
+        id="TCA/Jump-v0",
+        entry_point="tca_mj.envs.jump:Jump",
+        max_episode_steps=150,
+    ),
     *(
         Task(
             id=f"TCA/Tetrapod{gait.capitalize()}-v0",
@@ -142,6 +147,7 @@ _SHOWN = (
     Demo(name="adaptive-grasp", task="TCA/AdaptiveGrasp-v0"),
     Demo(name="tetrapod", task="TCA/TetrapodCourse-v0"),
     Demo(name="finger", task="TCA/FingerSense-v0"),
+    Demo(name="jump", task="TCA/Jump-v0"),
     *(
         Demo(
             name=way,

@@ -22,6 +22,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from tca_mj.actuation import Group, MixedBank, Signal, muscle_group
 from tca_mj.checks import (
+    Checked,
     NotNegative,
     Numbers,
     Positive,
@@ -60,6 +61,7 @@ Timestep = Annotated[float, partial(number, at_least=1e-6, at_most=0.1, unit="s"
 Ambient = Annotated[float, partial(number, at_least=-40.0, at_most=60.0, unit="°C")]
 
 _SLIDE = int(mujoco.mjtJoint.mjJNT_SLIDE)
+_SNAPPING = int(mujoco.mjtIntegrator.mjINT_IMPLICITFAST)
 
 # Warnings after which MuJoCo has reset the state by itself.
 DIVERGENCE = {
@@ -96,6 +98,50 @@ class Drive:
     fan: ArrayLike = False
 
 
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Haste(Checked):
+    """Smaller steps while something of a robot snaps beside something that it can strike.
+
+    Strikes ask for them: what snaps through free air takes the simulation's own. Beside something
+    is what MuJoCo lists a contact for, which it does from the geoms' ``gap`` on. The integrator is
+    ``implicitfast`` then, which does not damp what moves that fast.
+
+    Attributes:
+        speed: Speed of a hinge or slide above which it snaps [rad/s, m/s].
+        timestep: Physics time step then [s].
+        tca_period: Time between two updates of the TCAs then, a multiple of ``timestep`` and a
+            whole fraction of the simulation's own [s].
+
+    Raises:
+        ValueError: If a number is out of range, or the period no multiple.
+    """
+
+    speed: Positive
+    timestep: Timestep
+    tca_period: Positive
+
+    def __post_init__(self) -> None:
+        Checked.__post_init__(self)
+        _whole_number("tca_period", self.tca_period, "timestep", self.timestep)
+
+    @property
+    def substeps(self) -> int:
+        """Physics steps between two updates."""
+        return round(self.tca_period / self.timestep)
+
+
+def _whole_number(name: str, whole: float, of: str, part: float) -> int:
+    """How many times a time is in another one.
+
+    Raises:
+        ValueError: If that is no positive whole number.
+    """
+    count = round(whole / part)
+    if count < 1 or abs(count * part - whole) > 1e-9:
+        raise ValueError(f"{name} must be a positive multiple of {of} {part} s, got {whole}")
+    return count
+
+
 class Simulation:
     """A built part with its TCAs, in motion.
 
@@ -118,6 +164,7 @@ class Simulation:
         spines: The shape-memory spines, if there are any.
         chains: Its chains by name.
         gain: Factor of every tension over the TCAs' law, see ``tca_mj.variation``.
+        haste: Smaller steps while something snaps, or None.
 
     Example:
         >>> from tca_mj import Simulation, bending_module
@@ -137,6 +184,7 @@ class Simulation:
         ambient: Ambient = 25.0,
         law: LawChoice = "surface",
         supply: Supply | None = None,
+        haste: Haste | None = None,
     ) -> None:
         """Compiles ``part``; its specification can still be changed and compiled again.
 
@@ -151,17 +199,17 @@ class Simulation:
             law: What computes the TCAs' tensions, see ``TcaBank``. If a coil has no "surface",
                 which no published one lacks, the exact "rod" takes its place; ``bank.law`` tells.
             supply: What the commands of ``step`` mean; by default they are powers.
+            haste: Smaller steps while something snaps; None for none.
 
         Raises:
-            ValueError: If a number is out of range, the period is no multiple of the time step,
+            ValueError: If a number is out of range, a period is no multiple of the time step,
                 there is no such ``law``, or MuJoCo cannot compile the part.
         """
         number("tca_period", tca_period, at_most=MOST_SUBSTEPS * timestep, unit="s")
-        substeps = round(tca_period / timestep)
-        if substeps < 1 or abs(substeps * timestep - tca_period) > 1e-9:
-            raise ValueError(
-                f"tca_period must be a positive multiple of timestep {timestep} s, got {tca_period}"
-            )
+        substeps = _whole_number("tca_period", tca_period, "timestep", timestep)
+        if haste is not None:
+            _whole_number("tca_period", tca_period, "haste.tca_period", haste.tca_period)
+        self.haste = haste
         count_warnings()
         part.spec.option.timestep = timestep
         try:
@@ -192,7 +240,7 @@ class Simulation:
 
         self.body = SmoothBody(model, part.tcas)
         # What is renewed only every period needs more damping than the time step (by trial).
-        self.steadiness = max(timestep, 0.4 * tca_period)
+        self.steadiness = _steadiness(timestep, tca_period)
         self.spines = Spines(part.spines, self.body, self.tca_names, ambient)
 
         # The bodies' unloaded shape is that of their springs; TCAs are measured from there.
@@ -200,6 +248,7 @@ class Simulation:
         address = model.jnt_qposadr[scalar]
         self.data.qpos[address] = model.qpos_spring[address]
         self._start = self.data.qpos.copy()
+        self._scalar = model.jnt_dofadr[scalar]
         rest = np.array([tca.spec.rest_length + tca.stretch for tca in part.tcas])
         self.length_offset = self._zeros = np.zeros(self.n)
         self.length_offset = rest - self.length
@@ -466,30 +515,60 @@ class Simulation:
         """
         inputs = self.checked(command, voltage, fan)
         updates = self.updates(duration)
-        model, data = self.model, self.data
         for _ in range(updates):
-            self.strained, length, inside = measure(
-                self.body, self.bank, data.qpos, self.length_offset
-            )
-            self._check_length(length, inside)
-            try:
-                tca, pull = advance(
-                    self.bank, self.spines, self.tca, inputs, length=length,
-                    motion=self.strained.motion, gain=self.gain, period=self.tca_period,
-                )  # fmt: skip
-                self.power = (tca.energy_in - self.tca.energy_in) / self.tca_period
-                self.tca = tca
-            except TcaMelted as melted:
-                raise SimulationOverheated(
-                    f"{self.tca_names[melted.number]} {melted.why}, at {self.time:.3f} s"
-                ) from melted
-            except (CoilSolveError, ValueError) as error:  # far too hot for the law
-                raise SimulationDiverged(
-                    f"the TCAs have no state at {self.time:.3f} s: {error}"
-                ) from error
-            self._hand_over(pull)
-            mujoco.mj_step(model, data, self.substeps)
+            if self.haste is not None and self.snaps(self.data.qvel) and self._beside():
+                self._hurry(inputs, self.haste)
+            else:
+                self._update(inputs, self.tca_period, self.substeps)
         self._check()
+
+    def snaps(self, qvel: NDArray[np.float64]) -> bool:
+        """Whether something snaps at these velocities, shape (nv,), by what ``haste`` says."""
+        fastest = np.abs(qvel.take(self._scalar)).max(initial=0.0)
+        return self.haste is not None and bool(fastest > self.haste.speed)
+
+    def _beside(self) -> bool:
+        """Whether something is where it touches, or nearly."""
+        mujoco.mj_kinematics(self.model, self.data)
+        mujoco.mj_collision(self.model, self.data)
+        return bool(self.data.ncon)
+
+    def _hurry(self, inputs: Inputs, haste: Haste) -> None:
+        """One period in smaller steps."""
+        option = self.model.opt
+        own = option.timestep, option.integrator, self.steadiness
+        option.timestep, option.integrator = haste.timestep, _SNAPPING
+        self.steadiness = _steadiness(haste.timestep, haste.tca_period)
+        try:
+            for _ in range(round(self.tca_period / haste.tca_period)):
+                self._update(inputs, haste.tca_period, haste.substeps)
+        finally:
+            option.timestep, option.integrator, self.steadiness = own
+
+    def _update(self, inputs: Inputs, period: float, substeps: int) -> None:
+        """TCAs and spines, and then the body, go on by a period [s]."""
+        model, data = self.model, self.data
+        self.strained, length, inside = measure(
+            self.body, self.bank, data.qpos, self.length_offset
+        )
+        self._check_length(length, inside)
+        try:
+            tca, pull = advance(
+                self.bank, self.spines, self.tca, inputs, length=length,
+                motion=self.strained.motion, gain=self.gain, period=period,
+            )  # fmt: skip
+            self.power = (tca.energy_in - self.tca.energy_in) / period
+            self.tca = tca
+        except TcaMelted as melted:
+            raise SimulationOverheated(
+                f"{self.tca_names[melted.number]} {melted.why}, at {self.time:.3f} s"
+            ) from melted
+        except (CoilSolveError, ValueError) as error:  # far too hot for the law
+            raise SimulationDiverged(
+                f"the TCAs have no state at {self.time:.3f} s: {error}"
+            ) from error
+        self._hand_over(pull)
+        mujoco.mj_step(model, data, substeps)
 
     def checked(self, command: ArrayLike, voltage: ArrayLike, fan: ArrayLike) -> Inputs:
         """Command, shape (n,), voltage and fan, shape (spines.n,) each, for ``step``.
@@ -563,6 +642,11 @@ class Simulation:
                 f"the state diverged at {data.time:.3f} s ({names}); a smaller timestep or less"
                 " power may help"
             )
+
+
+def _steadiness(timestep: float, tca_period: float) -> float:
+    """Time over which the damping of taut tendons is made [s]."""
+    return max(timestep, 0.4 * tca_period)
 
 
 def _bank(specs: Sequence[Any], law: LawChoice, ambient: float) -> Any:

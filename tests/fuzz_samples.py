@@ -216,6 +216,7 @@ BY_SURFACE: dict[str, dict[str, Any]] = {
     },
     "agents.scripts.arm.scripted": {"task": lambda: task_env("TCA/ArmPickPlace-v0").unwrapped},
     "agents.scripts.finger.scripted": {"task": lambda: task_env("TCA/FingerSense-v0").unwrapped},
+    "agents.scripts.jump.scripted": {"task": lambda: task_env("TCA/Jump-v0").unwrapped},
     "agents.scripts.morph.scripted": {"task": lambda: task_env("TCA/MorphModule-v0").unwrapped},
     "agents.scripts.tetrapod.scripted": {"task": lambda: task_env("TCA/TetrapodWalk-v0").unwrapped},
     "agents.scripts.reach.scripted": {"task": lambda: task_env(TASK).unwrapped},

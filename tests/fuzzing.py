@@ -82,6 +82,7 @@ NO_DOOR = {
             "agents.scripts.morph.MorphPolicy.act", "agents.scripts.reach.ReachPolicy.act",
             "agents.scripts.course.CourseWalker", "agents.policies.gait.GaitPolicy.told_of",
             "agents.scripts.adaptive.AdaptivePolicy.act", "agents.scripts.grasp.GraspPolicy.act",
+            "agents.scripts.jump.JumpPolicy.act",
             "envs.wrappers.*", "envs.table.Table.scaled", "envs.table.Table.mirrored",
             "envs.table.Table.read", "envs.table.Table.outside", "envs.table.Table.bounded",
             "envs.task", "envs.vector", "agents.train.sb3_env.*", "agents.policies.actors.Blind",

@@ -42,7 +42,10 @@ INTERNAL = {
     "tca_mj.robots": {
         "lift": "add_lift", "tetrapod": "add_rail attach_legs dress route_spine_tca trunk",
     },
-    "tca_mj.modules": {"morphing": "dress"},
+    "tca_mj.modules": {
+        "bistable": "BAND_RATIO NYLON_DENSITY NYLON_POISSON RUBBER_MASS SIDES",
+        "morphing": "dress",
+    },
     "tca_mj.record": {
         "layout": "*", "plots": "event_rows save_figure", "render": "Closing", "shapes": "*",
     },
@@ -65,8 +68,8 @@ INTERNAL = {
     "tca_mj.agents.scripts": {
         # one for each task, found by the task's ``scripted``
         "adaptive": "scripted", "arm": "scripted", "finger": "Run calibrate scripted",
-        "grasp": "scripted", "morph": "calibrate scripted", "reach": "scripted",
-        "tetrapod": "scripted",
+        "grasp": "scripted", "jump": "scripted", "morph": "calibrate scripted",
+        "reach": "scripted", "tetrapod": "scripted",
     },
     "tca_mj.agents.train": {
         "config": "best_algorithm described", "deep": "Run exported film learner record",

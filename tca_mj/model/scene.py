@@ -42,7 +42,7 @@ def scene(
 
     Args:
         arena: MJCF file of the arena; its visual settings become the scene's.
-        robot: The robot; it is used up.
+        robot: The robot; it is used up. Its integrator becomes the scene's.
         objects: MJCF files of the objects, by the name that each gets in the scene. Each file's
             bodies are put into the world where the file says.
         name: Name of the robot in the scene.
@@ -53,6 +53,7 @@ def scene(
     """
     spec = load(arena)
     set_options(spec)
+    spec.option.integrator = robot.spec.option.integrator
     origin = spec.worldbody.add_site(name="origin", group=4)
     part = Part(spec)
     place = "place" if any(pos) else "origin"

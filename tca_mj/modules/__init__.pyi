@@ -6,6 +6,7 @@ from tca_mj.modules.bending import (
     silicone_cylinder,
     straight_module,
 )
+from tca_mj.modules.bistable import BistableSpec, bistable_module, capstan, shaped, snapping
 from tca_mj.modules.continuum_leg import LegSpec
 from tca_mj.modules.finger import FingerPairSpec, finger_pair
 from tca_mj.modules.innervated import InnervatedFingerSpec, innervated_finger
@@ -14,8 +15,9 @@ from tca_mj.modules.soft_finger import SoftFingerSpec
 from tca_mj.modules.twisting import TwistingSpec, twisting_module
 
 __all__ = [
-    "BendingSpec", "FingerPairSpec", "InnervatedFingerSpec", "LegSpec", "MorphingSpec",
-    "SILICONE_SHEAR", "SILICONE_YOUNG", "SoftFingerSpec", "TwistingSpec", "bending_module",
-    "finger_pair", "innervated_finger", "morphing_module", "silicone_cylinder", "straight_module",
+    "BendingSpec", "BistableSpec", "FingerPairSpec", "InnervatedFingerSpec", "LegSpec",
+    "MorphingSpec", "SILICONE_SHEAR", "SILICONE_YOUNG", "SoftFingerSpec", "TwistingSpec",
+    "bending_module", "bistable_module", "capstan", "finger_pair", "innervated_finger",
+    "morphing_module", "shaped", "silicone_cylinder", "snapping", "straight_module",
     "twisting_module",
 ]  # fmt: skip

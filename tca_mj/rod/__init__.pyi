@@ -1,3 +1,4 @@
+from tca_mj.rod.banded import BandedRod, Thresholds
 from tca_mj.rod.beam import BeamSpec, Outline, torsion_constant
 from tca_mj.rod.errors import RodSolveError
 from tca_mj.rod.problem import Segment, StrandLaw
@@ -5,6 +6,6 @@ from tca_mj.rod.shape import RodShape, bend
 from tca_mj.rod.static import solve_series, solve_static
 
 __all__ = [
-    "BeamSpec", "Outline", "RodShape", "RodSolveError", "Segment", "StrandLaw", "bend",
-    "solve_series", "solve_static", "torsion_constant",
+    "BandedRod", "BeamSpec", "Outline", "RodShape", "RodSolveError", "Segment", "StrandLaw",
+    "Thresholds", "bend", "solve_series", "solve_static", "torsion_constant",
 ]  # fmt: skip

@@ -19,6 +19,7 @@ from tca_mj.routes import parallel
 from tca_mj.sim import Simulation
 from tca_mj.tca import CATALOGUE, HeatStep, law_at
 from tca_mj.validation.attitude import JUDGED, bent, contact_for, in_free_air
+from tca_mj.validation.bistable import findings as bistable_forces
 from tca_mj.validation.facts import Finding, finding, words
 from tca_mj.validation.heat import finger_body
 from tca_mj.validation.replay import PRINTED, Course, loaded_arm
@@ -34,7 +35,7 @@ def findings(*, full: bool = True) -> list[Finding]:
     """All of them, in about 20 s; without ``full`` those that take a moment."""
     return [
         *bending(full=full), *rods(), *wrist(), *gripper(), *finger(), *bistable(),
-        *weight(), *(arm() if full else ()),
+        *bistable_forces(full=full), *weight(), *(arm() if full else ()),
     ]  # fmt: skip
 
 

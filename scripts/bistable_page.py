@@ -1,0 +1,102 @@
+"""The pictures and the tables of docs/bistable.md and docs/jump.md.
+
+    python scripts/bistable_page.py             draws docs/pictures/bistable.png and jump.png
+    python scripts/bistable_page.py --tables    prints the tables
+"""
+
+import argparse
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import imageio.v3 as imageio
+import matplotlib.pyplot as plt
+import mujoco
+import numpy as np
+
+from tca_mj import BistableSpec
+from tca_mj.agents.scripts.jump import JumpPolicy
+from tca_mj.envs.jump import Jump
+from tca_mj.validation.bistable import ANGLES, Snap, landscape, lines, snap
+
+PICTURES = Path(__file__).resolve().parent.parent / "docs" / "pictures"
+SPEC = BistableSpec()
+KINDS = {"symmetric": 0.0, "asymmetric": 50.0, "monostable": 110.0}  # angle of the spine [deg]
+
+
+def at(angle: float) -> BistableSpec:
+    """The module with a spine of so many degrees."""
+    return replace(SPEC, angle=math.radians(angle))
+
+
+def forces() -> None:
+    """Energy landscapes and triggering forces by arc, by theory and by MuJoCo."""
+    figure, axes = plt.subplots(1, 4, figsize=(14, 3.4))
+    bends = np.radians(np.linspace(-150.0, 150.0, 61))
+    for axis, (kind, angle) in zip(axes, KINDS.items(), strict=False):
+        rod = at(angle).rod
+        axis.plot(np.degrees(bends), [1e3 * rod.lumped(b) for b in bends], ":", label="arc")
+        axis.plot(np.degrees(bends), [1e3 * rod.energy(b) for b in bends], label="elastica")
+        some = bends[5:-5:5]
+        axis.plot(np.degrees(some), 1e3 * landscape(at(angle), some), "k.", label="MuJoCo")
+        axis.set(title=f"{kind}, θ0 = {angle:.0f}°", xlabel="bend [°]", ylabel="energy [mJ]")
+    axes[0].legend()
+    force = lines(SPEC)
+    for name, lumped, style in (("arc", True, ":"), ("elastica", False, "-")):
+        theory = [at(a).rod.thresholds(SPEC.offset, lumped=lumped) for a in ANGLES]
+        for k in (0, 1):
+            axes[3].plot(ANGLES, [max(0.0, row[k]) for row in theory], f"C{k}{style}",
+                         label=f"F_t{k + 1}, {name}")  # fmt: skip
+    axes[3].plot(ANGLES, force.T, "k.")
+    axes[3].set(title="triggering forces", xlabel="θ0 [°]", ylabel="tension of a cable [N]")
+    axes[3].legend(fontsize=7)
+    figure.tight_layout()
+    figure.savefig(PICTURES / "bistable.png", dpi=110)
+
+
+def jumping() -> None:
+    """Four moments of a jump."""
+    env, policy, pictures = Jump(render_mode="rgb_array", size=(400, 360)), JumpPolicy(), []
+    observation, _ = env.reset(seed=0)
+    ended = False
+    while not ended:
+        pictures.append(env.render())
+        observation, _, terminated, truncated, _ = env.step(policy.act(observation))
+        ended = terminated or truncated
+    last = len(pictures) - 1
+    shown = [pictures[i] for i in (0, last - 4, last - 3, last)]
+    imageio.imwrite(PICTURES / "jump.png", np.concatenate(shown, axis=1))
+
+
+def tables() -> str:
+    """Triggering forces and the snap, as Markdown."""
+    force = lines(SPEC)
+    rows = ["| θ0 [°] | F_t1: arc, elastica, MuJoCo [N] | F_t2 [N] | states at rest [°] |",
+            "|---|---|---|---|"]  # fmt: skip
+    for k, angle in enumerate(ANGLES):
+        rod = at(angle).rod
+        arc, exact = (rod.thresholds(SPEC.offset, lumped=lumped) for lumped in (True, False))
+        cells = (f"{max(0.0, a):.3f}, {max(0.0, b):.3f}, {c:.3f}" for a, b, c in
+                 zip(arc, exact, force[:, k], strict=True))  # fmt: skip
+        rest = ", ".join(f"{math.degrees(state):.0f}" for state in rod.states()[::2])
+        rows.append(f"| {angle:.0f} | {' | '.join(cells)} | {rest} |")
+    rows += ["", "| step [ms] | implicitfast: m/s, ms, balance | discrete |", "|---|---|---|"]
+
+    def told(found: Snap) -> str:
+        return f"{found.speed:.2f}, {1e3 * found.time:.1f}, {found.lost / found.freed:.3f}"
+
+    for step in (2.0, 1.0, 0.5, 0.2, 0.1, 0.02):
+        both = (snap(SPEC, 1e-3 * step, kind) for kind in
+                (None, int(mujoco.mjtIntegrator.mjINT_DISCRETE)))  # fmt: skip
+        rows.append(f"| {step:g} | {' | '.join(told(found) for found in both)} |")
+    return "\n".join(rows)
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--tables", action="store_true")
+    if parser.parse_args().tables:
+        print(tables())
+    else:
+        forces()
+        jumping()
