@@ -262,7 +262,7 @@ def test_a_part_that_is_attached_takes_its_spines_along():
         world.spec.worldbody.add_site(name=f"{name}_base", pos=[x, 0.0, 0.0])
         world.attach(piece(), to=f"{name}_base", prefix=name)
     assert [spine.name for spine in world.spines] == ["left.spine", "right.spine"]
-    assert world.spines[1].tca == "right.tca"
+    assert [name for name, _ in world.spines[1].tcas] == ["right.tca"]
     assert {joint.split(".")[0] for joint, _ in world.spines[1].joints} == {"right"}
     sim = simulation(world)
     heat_to(sim, [COLD, HOT])
@@ -285,9 +285,9 @@ def test_bad_spines_are_refused():
     with pytest.raises(ValueError, match="damping_time"):
         replace(spine, damping_time=0.0)
     with pytest.raises(ValueError, match="bend_x0"):
-        RoutedSpine("spine", SPINE, HEATER, (("bend_x0", -1.0),), "tca")
+        RoutedSpine("spine", SPINE, HEATER, (("bend_x0", -1.0),), (("tca", 1.0),))
     for changed, message in (
-        (replace(spine, tca="nobody"), "tca of a spine must be one of"),
+        (replace(spine, tcas=(("nobody", 1.0),)), "tcas of a spine must be some of"),
         (replace(spine, joints=(("free", 1.0),)), "cells that a TCA crosses"),
     ):
         other = piece()

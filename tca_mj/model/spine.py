@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Annotated, Any
@@ -11,7 +11,7 @@ from typing import Annotated, Any
 from tca_mj.checks import Checked, Positive, door, require_positive, whole
 from tca_mj.model.chain import Chain, Motion
 from tca_mj.rod.beam import BeamSpec, torsion_constant
-from tca_mj.smp import HeaterSpec, SpineSpec
+from tca_mj.smp import HeaterSpec, SpineSpec, soft_bending_rate
 
 # Shear modulus over Young's modulus, at any temperature: Poisson's ratio 0.35 when glassy, 0.5 when
 # rubbery; between the two. An estimate.
@@ -28,31 +28,35 @@ class RoutedSpine(Checked):
         heater: Its heater wire.
         joints: Names of the joints that it stiffens, and the stiffness of each per modulus
             [m³/rad], or [m] for a slide.
-        tca: Name of the TCA that bends it.
+        tcas: Names of the TCAs that deform it, and the angle by which each turns the soft spine
+            per tension [rad/N].
         damping_time: Kelvin-Voigt time: damping over stiffness of these joints [s].
 
     Raises:
-        ValueError: If a stiffness or the damping time is not positive, or a joint comes twice.
+        ValueError: If a stiffness, an angle or the damping time is not positive, or a joint or a
+            TCA comes twice or not at all.
     """
 
     name: str
     spec: SpineSpec
     heater: HeaterSpec
     joints: tuple[tuple[str, float], ...]
-    tca: str
+    tcas: tuple[tuple[str, float], ...]
     damping_time: Positive = 5e-3
 
     @door
     def renamed(self, prefix: str) -> RoutedSpine:
         """The same with a prefix before all names."""
         joints = tuple((prefix + joint, share) for joint, share in self.joints)
-        return replace(self, name=prefix + self.name, tca=prefix + self.tca, joints=joints)
+        tcas = tuple((prefix + tca, turn) for tca, turn in self.tcas)
+        return replace(self, name=prefix + self.name, tcas=tcas, joints=joints)
 
     def __post_init__(self) -> None:
         Checked.__post_init__(self)
-        require_positive(**dict(self.joints))
-        if not 0 < len(self.joints) == len({name for name, _ in self.joints}):
-            raise ValueError(f"joints of {self.name} must differ, at least 1, got {self.joints}")
+        for field, pairs in (("joints", self.joints), ("tcas", self.tcas)):
+            require_positive(**dict(pairs))
+            if not 0 < len(pairs) == len({name for name, _ in pairs}):
+                raise ValueError(f"{field} of {self.name} must differ, at least 1, got {pairs}")
 
 
 @door
@@ -62,7 +66,7 @@ def route_spine(
     chains: Sequence[Chain],
     *,
     name: str,
-    tca: str,
+    tca: str | Mapping[str, float],
     torsion: float | Sequence[float] | None = None,
     damping_time: Positive = 5e-3,
 ) -> RoutedSpine:
@@ -76,7 +80,8 @@ def route_spine(
         heater: Its heater wire.
         chains: The chains, one behind the other.
         name: Its name.
-        tca: Name of the TCA that bends it.
+        tca: Name of the TCA that bends it as ``spec`` says; or the names of several, and the angle
+            by which each turns the soft spine per tension [rad/N].
         torsion: Torsional stiffness over the modulus E [m⁴], of all nodes or of each of the chains'
             nodes in their order; by default that of its section.
         damping_time: Kelvin-Voigt time [s]. Estimate.
@@ -101,7 +106,8 @@ def route_spine(
         for (cell, node), twist in zip(nodes, each, strict=True)
         for motion, joint in node.items()
     ]
-    return RoutedSpine(name, spec, heater, tuple(joints), tca, damping_time)
+    tcas = {tca: float(soft_bending_rate(spec, 1.0))} if isinstance(tca, str) else tca
+    return RoutedSpine(name, spec, heater, tuple(joints), tuple(tcas.items()), damping_time)
 
 
 @door

@@ -12,7 +12,7 @@ from tca_mj.checks import Array, flags, within
 from tca_mj.model.smooth import SmoothBody
 from tca_mj.model.spine import RoutedSpine
 from tca_mj.model.sums import Total, rows
-from tca_mj.smp import DamageSpec, SpineBank, SpinesState, soft_bending_rate
+from tca_mj.smp import DamageSpec, SpineBank, SpinesState
 from tca_mj.smp.damage import damaging
 from tca_mj.tca.arrays import row, stacked
 
@@ -49,11 +49,10 @@ class Spines:
         self._sprung: Any = (None, None)  # state for which springs were computed last, and these
         if not self.n:
             return
-        unknown = [spine.tca for spine in spines if spine.tca not in tcas]
+        unknown = [tca for spine in spines for tca, _ in spine.tcas if tca not in tcas]
         if unknown:
-            raise ValueError(f"tca of a spine must be one of {tuple(tcas)}, got {unknown}")
+            raise ValueError(f"tcas of a spine must be some of {tuple(tcas)}, got {unknown}")
         specs = [spine.spec for spine in spines]
-        self._rate = np.array([float(soft_bending_rate(spec, 1.0)) for spec in specs])
         pairs = [(i, *joint) for i, spine in enumerate(spines) for joint in spine.joints]
         owner = np.array([i for i, _, _ in pairs], np.int64)
         self._place = body.places([name for _, name, _ in pairs])
@@ -61,8 +60,14 @@ class Spines:
         self._time = np.array([spine.damping_time for spine in spines])[owner]
         heaters = [replace(spine.heater, ambient=ambient) for spine in spines]
         self.bank = SpineBank(specs, heaters, owner)
-        self._tca = np.array([tcas.index(spine.tca) for spine in spines])
-        self._first = np.searchsorted(owner, np.arange(self.n))  # joint of each spine
+        # Of each pair of a spine and one of its TCAs: the TCA, how far it turns the soft spine, and
+        # a joint of the spine; and the first pair of each spine.
+        turned = [(i, *each) for i, spine in enumerate(spines) for each in spine.tcas]
+        spine = np.array([i for i, _, _ in turned])
+        self._tca = np.array([tcas.index(tca) for _, tca, _ in turned])
+        self._rate = np.array([turn for _, _, turn in turned])
+        self._joint = np.searchsorted(owner, spine)
+        self._pair = np.searchsorted(spine, np.arange(self.n))
         self._damage = DamageSpec.of(self.bank.smp)
         self._body = body
         stiffness, rest, damping = body.stiffness.copy(), body.rest.copy(), body.damping.copy()
@@ -166,10 +171,11 @@ class Spines:
         self.voltage = voltage
         state = self.state = self.bank.advance(self.state, voltage, fan, self._angles(motion), dt)
         modulus = self._stiffen(state)
-        self.damaged = self.damaged | damaging(
-            modulus.take(self._first, axis=-1), tension.take(self._tca, axis=-1),
+        harmed = damaging(
+            modulus.take(self._joint, axis=-1), tension.take(self._tca, axis=-1),
             self._rate * tension_rate.take(self._tca, axis=-1), self._damage,
         )  # fmt: skip
+        self.damaged = self.damaged | np.logical_or.reduceat(harmed, self._pair, axis=-1)
 
     def _stiffen(self, state: SpinesState) -> Array:
         """Sets the springs of the cells; returns the modulus of the spine at each joint [Pa]."""
