@@ -13,6 +13,12 @@ from tca_mj.modules.continuum_leg import LegSpec, continuum_leg
 from tca_mj.modules.finger import FingerPairSpec, finger_pair
 from tca_mj.modules.innervated import InnervatedFingerSpec, innervated_finger
 from tca_mj.modules.morphing import MorphingSpec, morphing_module
+from tca_mj.modules.morphing_square import (
+    Morphing3dSpec,
+    TwistMorphingSpec,
+    morphing_3d_module,
+    twist_morphing_module,
+)
 from tca_mj.modules.soft_finger import SoftFingerSpec, soft_finger
 from tca_mj.modules.twisting import TwistingSpec, twisting_module
 from tca_mj.record.film import Film
@@ -34,18 +40,18 @@ from tca_mj.tca.supply import Supply, Thermostat
 from tca_mj.variation import Nominal, Variation
 
 __version__: str
-
 __all__ = [
     "AdaptiveGripperSpec", "ArmSpec", "BeamSpec", "BendingSpec", "BistableSpec", "CATALOGUE",
     "Chain", "Drive", "FibreSpec", "Film", "FingerPairSpec", "GripperSpec", "Group", "Haste",
     "Helix", "InnervatedFingerSpec", "JumperSpec", "LegSpec", "MixedBank", "MixedState",
-    "MorphingSpec", "Muscle", "MuscleBank", "Nominal", "Outline", "Part", "Recorder", "Route",
-    "RoutedTca", "Simulation", "SimulationBatch", "SimulationDiverged", "SimulationOverheated",
-    "SimulationState", "SoftFingerSpec", "Supply", "TASKS", "Task", "TcaBank", "TcaSpec",
-    "TetrapodSpec", "Thermostat", "TwistingSpec", "UTurn", "Variation", "adaptive_gripper",
-    "add_chain", "add_tca", "arm", "bending_module", "bistable_module", "continuum_leg",
-    "episode_steps", "export", "find_task", "finger_pair", "frozen", "get_state", "gripper",
-    "in_arena", "innervated_finger", "jumper", "leg_length", "make", "morphing_module", "new_spec",
-    "parallel", "register", "register_task", "rigid_tetrapod", "scene", "set_state", "soft_finger",
-    "stage", "task_class", "tetrapod", "twisting_module",
+    "Morphing3dSpec", "MorphingSpec", "Muscle", "MuscleBank", "Nominal", "Outline", "Part",
+    "Recorder", "Route", "RoutedTca", "Simulation", "SimulationBatch", "SimulationDiverged",
+    "SimulationOverheated", "SimulationState", "SoftFingerSpec", "Supply", "TASKS", "Task",
+    "TcaBank", "TcaSpec", "TetrapodSpec", "Thermostat", "TwistMorphingSpec", "TwistingSpec",
+    "UTurn", "Variation", "adaptive_gripper", "add_chain", "add_tca", "arm", "bending_module",
+    "bistable_module", "continuum_leg", "episode_steps", "export", "find_task", "finger_pair",
+    "frozen", "get_state", "gripper", "in_arena", "innervated_finger", "jumper", "leg_length",
+    "make", "morphing_3d_module", "morphing_module", "new_spec", "parallel", "register",
+    "register_task", "rigid_tetrapod", "scene", "set_state", "soft_finger", "stage", "task_class",
+    "tetrapod", "twist_morphing_module", "twisting_module",
 ]  # fmt: skip

@@ -11,13 +11,21 @@ from tca_mj.modules.continuum_leg import LegSpec
 from tca_mj.modules.finger import FingerPairSpec, finger_pair
 from tca_mj.modules.innervated import InnervatedFingerSpec, innervated_finger
 from tca_mj.modules.morphing import MorphingSpec, morphing_module
+from tca_mj.modules.morphing_square import (
+    Morphing3dSpec,
+    TwistMorphingSpec,
+    morphing_3d_module,
+    square_spine,
+    twist_morphing_module,
+)
 from tca_mj.modules.soft_finger import SoftFingerSpec
 from tca_mj.modules.twisting import TwistingSpec, twisting_module
 
 __all__ = [
     "BendingSpec", "BistableSpec", "FingerPairSpec", "InnervatedFingerSpec", "LegSpec",
-    "MorphingSpec", "SILICONE_SHEAR", "SILICONE_YOUNG", "SoftFingerSpec", "TwistingSpec",
-    "bending_module", "bistable_module", "capstan", "finger_pair", "innervated_finger",
-    "morphing_module", "shaped", "silicone_cylinder", "snapping", "straight_module",
+    "Morphing3dSpec", "MorphingSpec", "SILICONE_SHEAR", "SILICONE_YOUNG", "SoftFingerSpec",
+    "TwistMorphingSpec", "TwistingSpec", "bending_module", "bistable_module", "capstan",
+    "finger_pair", "innervated_finger", "morphing_3d_module", "morphing_module", "shaped",
+    "silicone_cylinder", "snapping", "square_spine", "straight_module", "twist_morphing_module",
     "twisting_module",
 ]  # fmt: skip

@@ -8,6 +8,7 @@ that a positive angle of ``bend_x`` bends the module towards its TCA.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from typing import Annotated
@@ -29,7 +30,7 @@ from tca_mj.tca import CATALOGUE, TcaSpec
 
 # Stiffness of what is round the spine (tube, wires) over that of the soft spine. Estimate: the
 # silicone of the tube, 0.1 MPa, has 0.002 of the soft spine's bending stiffness.
-_SHEATH = 2e-3
+SHEATH = 2e-3
 _weight = partial(size, kind="parts of soft robots", at_least=0.0, at_most=0.5, unit="kg")
 _PROTRUSIONS = 6  # pairs that hold the tube; Sun, Fig. 6.1, shows them, the number is an estimate
 
@@ -76,7 +77,7 @@ class MorphingSpec(Checked):
         """What the chain has besides the shape-memory spine."""
         spine, size = self.spine, self.spine.tca_offset + TUBE_DIAMETER / 2.0
         return sheath(
-            spine, _SHEATH, length=spine.length, line_density=self.mass / spine.length,
+            spine, SHEATH, length=spine.length, line_density=self.mass / spine.length,
             outline=Outline(spine.width / 2.0, size, round=False),
         )  # fmt: skip
 
@@ -116,9 +117,7 @@ def morphing_module(spec: MorphingSpec | None = None) -> Part:
     spine = route_spine(
         spec.spine, spec.heater, [chain], name="spine", tca="tca", damping_time=spec.damping_time
     )
-    end = chain.tip.add_body(name="tip", pos=[0.0, 0.0, chain.local(spec.nodes)])
-    end.ipos = [0.0, 0.0, 0.0]  # a body without mass is pushed where its centre of mass is said
-    end.add_site(name="tip", group=4)
+    add_end(chain)
     if spec.tip_mass > 0.0:
         chain.tip.add_geom(
             name="weight", type=mujoco.mjtGeom.mjGEOM_SPHERE, size=[6e-3, 0.0, 0.0],
@@ -128,18 +127,29 @@ def morphing_module(spec: MorphingSpec | None = None) -> Part:
     return Part(mjspec, (tca,), {"tip": "tip"}, (spine,))
 
 
-def dress(chain: Chain, spec: MorphingSpec, name: str = "") -> None:
+def add_end(chain: Chain) -> None:
+    """Gives the end of a module's spine the site ``tip``, and a body there for external forces."""
+    end = chain.tip.add_body(name="tip", pos=[0.0, 0.0, chain.local(chain.nodes)])
+    end.ipos = [0.0, 0.0, 0.0]  # a body without mass is pushed where its centre of mass is said
+    end.add_site(name="tip", group=4)
+
+
+def dress(
+    chain: Chain, spec: MorphingSpec, name: str = "", sides: Sequence[float] = (-1.0,)
+) -> None:
     """What is seen and touched: polymer, protrusions on its inner side, the two legs' tube.
 
     Args:
         chain: The module, or a part of it.
         spec: The module.
         name: What the names of the geoms begin with.
+        sides: On which sides tubes are, as signs of y.
     """
     spine, radius = spec.spine, TUBE_DIAMETER / 2.0
     box, cylinder = mujoco.mjtGeom.mjGEOM_BOX, mujoco.mjtGeom.mjGEOM_CYLINDER
     polymer, silicone = [0.86, 0.72, 0.42, 1.0], [0.92, 0.93, 0.95, 0.3]
     look = surface((0.3, 0.002, 1e-4), mass=0.0)
+    legs = [(y, x) for y in sides for x in (-1.0, 1.0)]
     held = {round(chain.nodes * i / (_PROTRUSIONS - 1)) for i in range(_PROTRUSIONS)}
     for index, piece in enumerate(chain.pieces):
         whole = chain.extent(index)
@@ -148,16 +158,16 @@ def dress(chain: Chain, spec: MorphingSpec, name: str = "") -> None:
             name=f"{name}polymer{index}", type=box, pos=[0.0, 0.0, middle],
             size=[spine.width / 2.0, spine.thickness / 2.0, middle], rgba=polymer, **look,
         )  # fmt: skip
-        for leg, side in enumerate((-1.0, 1.0)):
+        for leg, (y, x) in enumerate(legs):
             piece.add_geom(
                 name=f"{name}tube{leg}.{index}", type=cylinder, size=[radius, middle, 0.0],
-                pos=[side * spec.half_width, -spine.tca_offset, middle], rgba=silicone, **look,
+                pos=[x * spec.half_width, y * spine.tca_offset, middle], rgba=silicone, **look,
             )  # fmt: skip
         if index in held:
             at = {0: 1.5e-3, chain.nodes: whole - 1.5e-3}.get(index, middle)
-            for leg, side in enumerate((-1.0, 1.0)):
-                across = side * (spine.width / 2.0 - 0.3e-3)
+            for leg, (y, x) in enumerate(legs):
+                across = x * (spine.width / 2.0 - 0.3e-3)
                 piece.add_geom(
                     name=f"{name}protrusion{leg}.{index}", type=box, size=[0.5e-3, radius, 1.5e-3],
-                    pos=[across, -spine.tca_offset + 0.6e-3, at], rgba=polymer, **look,
+                    pos=[across, y * (spine.tca_offset - 0.6e-3), at], rgba=polymer, **look,
                 )  # fmt: skip

@@ -17,6 +17,7 @@ from tca_mj.model.build import add_tca
 from tca_mj.model.chain import MOTIONS, Chain, Motion, add_chain
 from tca_mj.model.part import Part
 from tca_mj.model.spine import route_spine
+from tca_mj.model.weld import weld
 from tca_mj.robots.tetrapod import (
     FewNodes,
     TetrapodSpec,
@@ -29,13 +30,6 @@ from tca_mj.routes import UTurn
 from tca_mj.smp.lumped import in_tube
 
 _LEG_MOTIONS: tuple[Motion, ...] = ("bend_x", "bend_y", "twist")
-
-# The welds hardly give: MuJoCo's default is softer than the spines in their plane. It takes a time
-# constant that is so short only with its flag ``refsafe`` disabled, else two time steps.
-_SOLREF = (2e-4, 1.0)
-_SOLIMP = (0.999, 0.9999, 1e-4, 0.5, 2.0)
-# Zeros: as they are when all joints are at 0, in line; 1 m/rad by which errors of rotation count.
-_WELD = [0.0] * 10 + [1.0, 0.0]
 
 
 @door
@@ -88,8 +82,5 @@ def _outer(
         rgba=(0.0, 0.0, 0.0, 0.0), collide=False,
     )  # fmt: skip
     dress(chain, spec, down=1.0, places={number: 0.0})
-    mjspec.add_equality(
-        name=name, type=mujoco.mjtEq.mjEQ_WELD, objtype=mujoco.mjtObj.mjOBJ_BODY,
-        name1=left.tip.name, name2=chain.tip.name, data=_WELD, solref=_SOLREF, solimp=_SOLIMP,
-    )  # fmt: skip
+    weld(mjspec, left.tip, chain.tip, name=name)
     return chain

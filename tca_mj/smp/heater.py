@@ -104,6 +104,21 @@ class HeaterSpec(Checked):
             resistance=hold_voltage**2 / (loss * excess), ambient=ambient,
         )  # fmt: skip
 
+    @classmethod
+    @door
+    def alike(cls, spine: SpineSpec) -> HeaterSpec:
+        """Constants of a spine of another section than the published one.
+
+        It loses as much heat per surface of polymer and excess temperature; so it cools in 25 s
+        times the ratio of their sections over their perimeters. 9.5 V hold its temperature, too.
+
+        Args:
+            spine: The spine.
+        """
+        thick, published = (s.width * s.thickness / (s.width + s.thickness)
+                            for s in (spine, SpineSpec()))  # fmt: skip
+        return cls.fitted(spine, cool_time=COOL_TIME * thick / published)
+
     @door
     def heat(self, fan: ArrayLike = False) -> HeatSpec:
         """The heat balance with the fan on or off, shape (..., n)."""

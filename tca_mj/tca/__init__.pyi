@@ -17,7 +17,7 @@ from tca_mj.tca.laws.creep import (
 from tca_mj.tca.laws.law import LawChoice, TensionLaw
 from tca_mj.tca.laws.rod import CoilRods, CoilShape, coil_tension
 from tca_mj.tca.laws.roots import CoilSolveError
-from tca_mj.tca.laws.statics import hanging_length, law_at, tension
+from tca_mj.tca.laws.statics import hanging_length, law_at, pulling_temperature, tension
 from tca_mj.tca.laws.surface import CoilSurfaces
 from tca_mj.tca.laws.table import CalibrationError, Surface, SurfaceBound, calibrate
 from tca_mj.tca.mandrel import kept_share
@@ -58,8 +58,9 @@ __all__ = [
     "Supply", "Surface", "SurfaceBound", "TcaBank", "TcaMelted", "TcaSpec", "TcaState",
     "TensionLaw", "Thermostat", "WireTable", "aged", "calibrate", "coil_tension", "fibre_stiffness",
     "fit_displacement", "hanging_length", "heat_lost", "hysteresis_damping", "in_silicone",
-    "kept_share", "law_at", "measured", "moving_average", "power_from_voltage", "pulse_mean",
-    "pulse_power", "radial_growth", "relaxation_time", "resistance", "resistance_displacement",
-    "ring_conductance", "sensed_length", "silicone_body", "softened_tension", "softening",
-    "solve_course", "solve_fibre", "step_temperature", "tension", "untwist",
+    "kept_share", "law_at", "measured", "moving_average", "power_from_voltage",
+    "pulling_temperature", "pulse_mean", "pulse_power", "radial_growth", "relaxation_time",
+    "resistance", "resistance_displacement", "ring_conductance", "sensed_length", "silicone_body",
+    "softened_tension", "softening", "solve_course", "solve_fibre", "step_temperature", "tension",
+    "untwist",
 ]  # fmt: skip

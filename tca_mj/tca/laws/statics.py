@@ -31,8 +31,17 @@ from typing import get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.optimize import brentq
 
-from tca_mj.checks import Array, door, require_one_of, within
+from tca_mj.checks import (
+    Array,
+    NotNegative,
+    Positive,
+    Temperature,
+    door,
+    require_one_of,
+    within,
+)
 from tca_mj.tca.laws.castigliano import Scheme
 from tca_mj.tca.laws.coil import Spin
 from tca_mj.tca.laws.model import CoilModel, Model
@@ -114,6 +123,46 @@ def tension(
     length = within("length", length, at_least=shortest, at_most=longest, unit="m")
     force, stiffness = _in_chunks(problem.tension, length, _checked(tca, temperature))
     return force, stiffness
+
+
+@door
+def pulling_temperature(
+    tca: TcaSpec, length: Positive, force: NotNegative, *, hottest: Temperature = 180.0
+) -> float:
+    """Temperature at which a TCA of a length pulls with a force; the inverse of ``tension``.
+
+    Args:
+        tca: The TCA, whose ends are locked, as in a body.
+        length: Its length [m].
+        force: Its tension [N].
+        hottest: Temperature from which on there is none [°C]. Sun, Table 2.1, anneals at 180 °C.
+
+    Returns:
+        The temperature, not below that of the surroundings [°C].
+
+    Raises:
+        ValueError: If the length is out of range, or the TCA pulls less even when it is hottest.
+        CoilSolveError: As ``tension``.
+
+    Example:
+        >>> from tca_mj.tca import CATALOGUE, pulling_temperature
+        >>> tca = CATALOGUE["free-stroke"]
+        >>> print(f"{pulling_temperature(tca, 1.2 * tca.rest_length, 0.354):.1f} °C")
+        100.0 °C
+    """
+
+    def over(temperature: float) -> float:
+        return float(tension(tca, length, temperature)[0]) - force
+
+    if over(tca.ambient) >= 0.0:
+        return tca.ambient
+    most = over(hottest)
+    if most < 0.0:
+        raise ValueError(
+            f"force must be at most {force + most:.4g} N, what the TCA pulls with at"
+            f" {hottest:g} °C, got {force:.4g}"
+        )
+    return float(brentq(over, tca.ambient, hottest, xtol=1e-6))
 
 
 @door
