@@ -22,7 +22,7 @@ from tca_mj.checks import Array
 from tca_mj.model.chain import Member
 from tca_mj.model.part import Part
 from tca_mj.model.tendon import RoutedTca
-from tca_mj.rod import Segment, StrandLaw
+from tca_mj.rod import BeamSpec, Segment, StrandLaw
 from tca_mj.rod.lie import quaternion_matrix
 from tca_mj.routes import Helix
 from tca_mj.tca import TcaSpec
@@ -96,17 +96,18 @@ class Seen:
         chains: Its chains, each after that which it stands on.
     """
 
-    def __init__(self, part: Part) -> None:
+    def __init__(self, part: Part, beams: Mapping[str, BeamSpec] | None = None) -> None:
         """Reads the part.
 
         Args:
             part: The part, which stays as it is.
+            beams: For chains that are not what they were built as, by name, what they are.
 
         Raises:
             Outside: If there is something that theory does not know; it names the part, what it is
                 and the body.
         """
-        self._part, self._members = part, part.members
+        self._part, self._members, self._beams = part, part.members, beams or {}
         model = part.spec.copy().compile()
         _require_known(part, model)
         self.chains = tuple(sorted(
@@ -210,7 +211,7 @@ class Seen:
             for i, tca in enumerate(self._part.tcas)
         ]
         mass = sum(run.mass for _, mine in runs for run in mine)
-        beam = member.beam
+        beam = self._beams.get(member.name, member.beam)
         weight, centre = self._weights.get((member.name, end), (0.0, np.zeros(3)))
         whole = (low, high) == (0.0, 1.0)
         routes = [
@@ -253,7 +254,8 @@ def _require_known(part: Part, model: mujoco.MjModel) -> None:
             raise Outside(part, f"{what} {type(tca.spec).__name__} and no TCA")
     for spine in part.spines:
         body = model.body(int(model.jnt_bodyid[model.joint(spine.joints[0][0]).id])).name
-        raise Outside(part, f"has the shape-memory spine {spine.name!r} in the body {body!r}")
+        what = f"has the shape-memory spine {spine.name!r} in the body {body!r}, whose temperature"
+        raise Outside(part, f"{what} is not said")
     for number in range(model.neq):
         bodies = [_held(model, number, int(which[number])) for which in
                   (model.eq_obj1id, model.eq_obj2id)]  # fmt: skip

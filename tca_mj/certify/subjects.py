@@ -5,6 +5,7 @@ A new module or limb is one more function and one more entry of ``SUBJECTS``.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -12,14 +13,25 @@ from types import MappingProxyType
 from typing import Any
 
 from tca_mj.certify.parts import Limb, Seen
-from tca_mj.model.chain import Member
+from tca_mj.certify.solid import solid
+from tca_mj.model.chain import MOTIONS, Member
 from tca_mj.model.part import Part
 from tca_mj.modules.bending import BendingSpec, bending_module
 from tca_mj.modules.finger import FingerPairSpec, finger_pair
 from tca_mj.modules.innervated import InnervatedFingerSpec, innervated_finger
+from tca_mj.modules.morphing import MorphingSpec, morphing_module
+from tca_mj.modules.morphing_square import (
+    Morphing3dSpec,
+    TwistMorphingSpec,
+    morphing_3d_module,
+    twist_morphing_module,
+)
+from tca_mj.modules.soft_finger import SoftFingerSpec, soft_finger
 from tca_mj.modules.twisting import TwistingSpec, twisting_module
+from tca_mj.robots.adaptive_gripper import AdaptiveGripperSpec, hardened_gripper
 from tca_mj.robots.arm import ArmSpec, arm
-from tca_mj.rod import Segment, StrandLaw
+from tca_mj.rod import BeamSpec, Segment, StrandLaw
+from tca_mj.smp import HOLD_TEMPERATURE
 from tca_mj.tca import TcaSpec
 
 # Axes of the fingers' bases in the mount, as columns: z to its +x or -x, x to its -z.
@@ -74,6 +86,9 @@ class Subject:
         )  # fmt: skip
 
 
+_ROOM = 25.0  # temperature of a cold spine [°C]
+
+
 def slack(length: float) -> tuple[float, float]:
     """The law of a TCA that does not pull."""
     return 0.0, 0.0
@@ -84,7 +99,8 @@ def _finer(spec: Any, times: int) -> Any:
 
 
 def read(part: Part, *, what: str, build: Callable[[int], Part] | None = None,
-         tips: Mapping[str, str] | None = None, **more: Any) -> Subject:  # fmt: skip
+         tips: Mapping[str, str] | None = None, beams: Mapping[str, BeamSpec] | None = None,
+         **more: Any) -> Subject:  # fmt: skip
     """A part as a subject, to theory what the part remembers of itself.
 
     Args:
@@ -93,12 +109,13 @@ def read(part: Part, *, what: str, build: Callable[[int], Part] | None = None,
         build: The built part with that many times the default nodes; None if that cannot be.
         tips: Sites at the ends of chains that are looked at, by the chains' names; None for all
             ends.
+        beams: For chains that are not what they were built as, by name, what they are.
         **more: Other fields of the subject.
 
     Raises:
         Outside: If theory does not cover it.
     """
-    seen = Seen(part)
+    seen = Seen(part, beams)
 
     def copied(times: int) -> Part:
         """The part with sites at the ends of its chains."""
@@ -153,6 +170,21 @@ def _twisting(spec: TwistingSpec) -> Subject:
     how = "double helix of 2.5 turns" if spec.double else f"helix of {spec.turns:g} turns"
     what = f"twisting module, {how}"
     return _module(twisting_module, spec, what, force=2e-2, moment=1e-4)
+
+
+def _morphing(
+    module: Callable[[Any], Part], spec: Any, what: str,
+    curvature: tuple[float, float, float] | None = None, **more: Any,
+) -> Subject:  # fmt: skip
+    """A module with a shape-memory spine: hot, or cold and fixed in a curvature [1/m]."""
+    temperature = HOLD_TEMPERATURE if curvature is None else _ROOM
+    fixed = {"spine": curvature} if curvature is not None else None
+
+    def build(times: int) -> Part:
+        return solid(module(_finer(spec, times)), temperature, fixed).part
+
+    part, beams = solid(module(spec), temperature, fixed)
+    return read(part, what=what, build=build, tips={"spine": "tip"}, beams=beams, **more)
 
 
 def _finger(spec: FingerPairSpec) -> Subject:
@@ -215,6 +247,32 @@ def _arm(spec: ArmSpec) -> Subject:
     )  # fmt: skip
 
 
+def _soft_finger(spec: SoftFingerSpec) -> Subject:
+    return _module(soft_finger, spec, "finger of the adaptive gripper", force=5e-2, moment=2e-4)
+
+
+def _adaptive(spec: AdaptiveGripperSpec, angle: float) -> Subject:
+    """The adaptive gripper, its base hardened in an angle."""
+
+    def build(times: int) -> Part:
+        finer = replace(spec, base=_finer(spec.base, times), fingers=_finer(spec.fingers, times))
+        return hardened_gripper(finer, angle)
+
+    return read(
+        build(1), what=f"adaptive gripper, its base hardened at {math.degrees(angle):.0f}°",
+        build=build, tips={f"finger{i}.body": f"finger{i}.tip" for i in range(2)},
+        postures=("hanging",), force=3e-2, moment=1e-4, mirrored=True,
+    )  # fmt: skip
+
+
+_QUARTER, _HALF = 0.5 * math.pi, math.pi
+_ACROSS = 1.0  # direction of the bend of the module that bends to any side [rad]
+# Largest loads on morphing modules. Cold: 15 g at the end, Sun, Fig. 6.1. Hot they weigh as much as
+# a soft spine bears: the published one falls over when it stands, and so does the square one.
+_SOFT: dict[str, Any] = {"force": 1e-2, "moment": 2e-4, "temperature": (25.0, 140.0)}
+_STIFF: dict[str, Any] = {"force": 0.147, "moment": 2e-3, "temperature": (25.0, 30.0)}
+_HANGS: dict[str, Any] = {"postures": ("hanging", "lying")}
+
 # What is certified, made when it is asked for, by name.
 SUBJECTS: Mapping[str, Callable[[], Subject]] = MappingProxyType({
     "bending": lambda: _bending(BendingSpec()),
@@ -222,5 +280,26 @@ SUBJECTS: Mapping[str, Callable[[], Subject]] = MappingProxyType({
     "twisting-single": lambda: _twisting(TwistingSpec(double=False, nodes=16)),
     "innervated": lambda: _innervated(InnervatedFingerSpec()),
     "finger": lambda: _finger(FingerPairSpec()),
+    "soft-finger": lambda: _soft_finger(SoftFingerSpec()),
+    "adaptive-gripper": lambda: _adaptive(
+        AdaptiveGripperSpec(base=MorphingSpec(motions=MOTIONS)), _HALF),
     "arm": lambda: _arm(ArmSpec()),
+    "morphing": lambda: _morphing(
+        morphing_module, MorphingSpec(motions=MOTIONS), "morphing module, soft",
+        **_SOFT, **_HANGS),
+    "morphing-cold": lambda: _morphing(
+        morphing_module, MorphingSpec(motions=MOTIONS), "morphing module, fixed at 180°",
+        (_HALF / MorphingSpec().spine.length, 0.0, 0.0), **_STIFF),
+    "morphing-twist": lambda: _morphing(
+        twist_morphing_module, TwistMorphingSpec(), "morphing module that twists, soft", **_SOFT),
+    "morphing-twist-cold": lambda: _morphing(
+        twist_morphing_module, TwistMorphingSpec(), "morphing module that twists, fixed at -90°",
+        (0.0, 0.0, -_QUARTER / TwistMorphingSpec().spine.length), **_STIFF),
+    "morphing-3d": lambda: _morphing(
+        morphing_3d_module, Morphing3dSpec(), "morphing module that bends to any side, soft",
+        **_SOFT, **_HANGS),
+    "morphing-3d-cold": lambda: _morphing(
+        morphing_3d_module, Morphing3dSpec(), "the same, fixed at 90° between two TCAs",
+        (-math.sin(_ACROSS) * _QUARTER / Morphing3dSpec().spine.length,
+         math.cos(_ACROSS) * _QUARTER / Morphing3dSpec().spine.length, 0.0), **_STIFF),
 })  # fmt: skip

@@ -31,7 +31,7 @@ MOTIONS: tuple[Motion, ...] = ("stretch", "bend_x", "bend_y", "twist")  # all of
 
 # Axis of each motion in the piece's frame, z along the beam.
 _AXIS = {"stretch": (0, 0, 1), "bend_x": (1, 0, 0), "bend_y": (0, 1, 0), "twist": (0, 0, 1)}
-_REFERENCE = {"bend_x": 0, "bend_y": 1, "twist": 2}  # component of the reference curvature
+HINGES = {"bend_x": 0, "bend_y": 1, "twist": 2}  # component of the curvature
 
 
 # The time of a step grows with the third power: 128 nodes take two hundred times as long as 8.
@@ -241,7 +241,7 @@ def add_chain(
         reach = length / 2.0 if node == 0 else length
         piece = piece.add_body(name=member.body(node + 1), pos=[0.0, 0.0, reach])
         names = member.joints(node)
-        rest = _hinge_angles(cell * np.array(spec.curvature), reverse=tuple(names) != kept)
+        rest = hinge_angles(cell * np.array(spec.curvature), reverse=tuple(names) != kept)
         for motion, joint in names.items():
             spring = stiffness[motion] / cell
             _add_joint(piece, joint, motion, spring, spec.damping_time, rest)
@@ -271,7 +271,7 @@ def _place(
     return on.tip, [pos[0], pos[1], pos[2] + on.local(on.nodes)]
 
 
-def _hinge_angles(turn: Array, *, reverse: bool) -> Array:
+def hinge_angles(turn: Array, *, reverse: bool) -> Array:
     """Angles of hinges about x, y, z, in this or the reverse order, that make a rotation [rad]."""
     r = quaternion_matrix(quaternion_exp(-turn if reverse else turn))
     angles = np.array([np.arctan2(-r[1, 2], r[2, 2]), np.arcsin(r[0, 2]),
@@ -286,7 +286,7 @@ def _add_joint(
     body.add_joint(
         name=name, type=mujoco.mjtJoint.mjJNT_HINGE if hinge else mujoco.mjtJoint.mjJNT_SLIDE,
         axis=list(_AXIS[motion]), stiffness=[stiffness, 0.0, 0.0],
-        damping=[time * stiffness, 0.0, 0.0], springref=rest[_REFERENCE[motion]] if hinge else 0.0,
+        damping=[time * stiffness, 0.0, 0.0], springref=rest[HINGES[motion]] if hinge else 0.0,
     )  # fmt: skip
 
 
