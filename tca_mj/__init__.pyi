@@ -28,6 +28,7 @@ from tca_mj.robots.adaptive_gripper import AdaptiveGripperSpec, adaptive_gripper
 from tca_mj.robots.arm import ArmSpec, arm
 from tca_mj.robots.gripper import GripperSpec, gripper
 from tca_mj.robots.jumper import JumperSpec, jumper
+from tca_mj.robots.morphing_grid import MorphingGridSpec, morphing_grid
 from tca_mj.robots.tetrapod import TetrapodSpec, rigid_tetrapod, tetrapod
 from tca_mj.rod.beam import BeamSpec, Outline
 from tca_mj.routes import Helix, Route, UTurn, leg_length, parallel
@@ -44,14 +45,14 @@ __all__ = [
     "AdaptiveGripperSpec", "ArmSpec", "BeamSpec", "BendingSpec", "BistableSpec", "CATALOGUE",
     "Chain", "Drive", "FibreSpec", "Film", "FingerPairSpec", "GripperSpec", "Group", "Haste",
     "Helix", "InnervatedFingerSpec", "JumperSpec", "LegSpec", "MixedBank", "MixedState",
-    "Morphing3dSpec", "MorphingSpec", "Muscle", "MuscleBank", "Nominal", "Outline", "Part",
-    "Recorder", "Route", "RoutedTca", "Simulation", "SimulationBatch", "SimulationDiverged",
-    "SimulationOverheated", "SimulationState", "SoftFingerSpec", "Supply", "TASKS", "Task",
-    "TcaBank", "TcaSpec", "TetrapodSpec", "Thermostat", "TwistMorphingSpec", "TwistingSpec",
-    "UTurn", "Variation", "adaptive_gripper", "add_chain", "add_tca", "arm", "bending_module",
-    "bistable_module", "continuum_leg", "episode_steps", "export", "find_task", "finger_pair",
-    "frozen", "get_state", "gripper", "in_arena", "innervated_finger", "jumper", "leg_length",
-    "make", "morphing_3d_module", "morphing_module", "new_spec", "parallel", "register",
-    "register_task", "rigid_tetrapod", "scene", "set_state", "soft_finger", "stage", "task_class",
-    "tetrapod", "twist_morphing_module", "twisting_module",
+    "Morphing3dSpec", "MorphingGridSpec", "MorphingSpec", "Muscle", "MuscleBank", "Nominal",
+    "Outline", "Part", "Recorder", "Route", "RoutedTca", "Simulation", "SimulationBatch",
+    "SimulationDiverged", "SimulationOverheated", "SimulationState", "SoftFingerSpec", "Supply",
+    "TASKS", "Task", "TcaBank", "TcaSpec", "TetrapodSpec", "Thermostat", "TwistMorphingSpec",
+    "TwistingSpec", "UTurn", "Variation", "adaptive_gripper", "add_chain", "add_tca", "arm",
+    "bending_module", "bistable_module", "continuum_leg", "episode_steps", "export", "find_task",
+    "finger_pair", "frozen", "get_state", "gripper", "in_arena", "innervated_finger", "jumper",
+    "leg_length", "make", "morphing_3d_module", "morphing_grid", "morphing_module", "new_spec",
+    "parallel", "register", "register_task", "rigid_tetrapod", "scene", "set_state", "soft_finger",
+    "stage", "task_class", "tetrapod", "twist_morphing_module", "twisting_module",
 ]  # fmt: skip

@@ -12,6 +12,7 @@ from scipy.spatial.transform import Rotation
 from tca_mj.certify.cable import BEAM as CABLE_BEAM
 from tca_mj.certify.cable import MOMENT, cable_tip, moment_tip, off
 from tca_mj.certify.cases import Case, Load, draw, theory
+from tca_mj.certify.grids import lattices
 from tca_mj.certify.rest import run
 from tca_mj.certify.subjects import SUBJECTS
 from tca_mj.checks import Array
@@ -77,9 +78,9 @@ class Claim:
 
 
 def claims() -> list[Claim]:
-    """All statements, in about ten seconds."""
+    """All statements, in about half a minute."""
     return [*known(), *bends(), *orders(), *helices(), *invariance(), *scaling(), *speed(),
-            *cables()]  # fmt: skip
+            *cables(), *grids()]  # fmt: skip
 
 
 def _errors(
@@ -260,3 +261,10 @@ def cables() -> Iterator[Claim]:
     yield Claim(group, f"MuJoCo's cable: {100 * coarse:.2f} % with 16 bodies, {100 * fine:.2f} %"
                 " with 32, extrapolated", "0.1 % of L", f"{100 * limit:.3f} %",
                 abs(limit) < 1e-3)  # fmt: skip
+
+
+def grids() -> Iterator[Claim]:
+    """The grid of morphing modules, soft, against what theory knows of its loops."""
+    for what, exact, error, most in lattices():
+        yield Claim("grid of modules, soft", f"{what}: {exact}", f"{100 * most:g} %",
+                    f"{100 * error:.4f} %", error < most)  # fmt: skip

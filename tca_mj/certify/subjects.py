@@ -13,7 +13,7 @@ from types import MappingProxyType
 from typing import Any
 
 from tca_mj.certify.parts import Limb, Seen
-from tca_mj.certify.solid import solid
+from tca_mj.certify.solid import Solid, solid
 from tca_mj.model.chain import MOTIONS, Member
 from tca_mj.model.part import Part
 from tca_mj.modules.bending import BendingSpec, bending_module
@@ -30,6 +30,7 @@ from tca_mj.modules.soft_finger import SoftFingerSpec, soft_finger
 from tca_mj.modules.twisting import TwistingSpec, twisting_module
 from tca_mj.robots.adaptive_gripper import AdaptiveGripperSpec, hardened_gripper
 from tca_mj.robots.arm import ArmSpec, arm
+from tca_mj.robots.morphing_grid import MorphingGridSpec, morphing_grid
 from tca_mj.rod import BeamSpec, Segment, StrandLaw
 from tca_mj.smp import HOLD_TEMPERATURE
 from tca_mj.tca import TcaSpec
@@ -265,6 +266,25 @@ def _adaptive(spec: AdaptiveGripperSpec, angle: float) -> Subject:
     )  # fmt: skip
 
 
+def _grid_member(spec: MorphingGridSpec, what: str, **more: Any) -> Subject:
+    """A grid of a single member, with the junction at its end."""
+    end = "x0.0.end"
+
+    def elastic(times: int) -> Solid:
+        finer = replace(spec, member=_finer(spec.member, times))
+        found = solid(morphing_grid(finer), HOLD_TEMPERATURE)
+        (member,) = found.part.members.values()
+        body = found.part.spec.body(member.body(member.nodes))
+        body.add_site(name=end, pos=[0.0, 0.0, member.local(member.nodes)])
+        return found
+
+    part, beams = elastic(1)
+    return read(
+        part, what=what, build=lambda times: elastic(times).part, tips={"x0.0": end}, beams=beams,
+        **more,
+    )  # fmt: skip
+
+
 _QUARTER, _HALF = 0.5 * math.pi, math.pi
 _ACROSS = 1.0  # direction of the bend of the module that bends to any side [rad]
 # Largest loads on morphing modules. Cold: 15 g at the end, Sun, Fig. 6.1. Hot they weigh as much as
@@ -302,4 +322,6 @@ SUBJECTS: Mapping[str, Callable[[], Subject]] = MappingProxyType({
         morphing_3d_module, Morphing3dSpec(), "the same, fixed at 90° between two TCAs",
         (-math.sin(_ACROSS) * _QUARTER / Morphing3dSpec().spine.length,
          math.cos(_ACROSS) * _QUARTER / Morphing3dSpec().spine.length, 0.0), **_STIFF),
+    "grid-member": lambda: _grid_member(
+        MorphingGridSpec(rows=1, columns=2), "grid of a single member, soft", **_SOFT),
 })  # fmt: skip
