@@ -23,7 +23,9 @@ from tca_mj.validation.figures import draw, need_matplotlib
 _NOTHING = 1e-6  # error below which there is no order to measure, and none is drawn [1, rad]
 _FIELDS = ("position", "rotation")
 _SHADES = {"hanging": "#0072b2", "lying": "#d55e00", "standing": "#8a4fa3"}
-_COLOURS = ("#0072b2", "#d55e00", "#009e73", "#8a4fa3", "#56b4e9", "#b8860b", "#555555")
+_COLOURS = ("#0072b2", "#d55e00", "#009e73", "#8a4fa3", "#56b4e9", "#b8860b", "#555555", "#cc3377",
+            "#88aa00", "#003f7f", "#ff9955", "#44ccaa", "#bb99ee", "#aa7755")  # fmt: skip
+_ABREAST = 5  # modules side by side in a figure
 _FIGURES = {
     "bend": "Error of the tip's place and rotation over its bend, at the default nodes. Dashed:"
     " 1 % of the length and 2°.",
@@ -35,7 +37,7 @@ def certify(
     names: Sequence[str] = (), *, out: Path | None = None, effort: Effort = FULL, seed: int = 0,
     workers: int | None = None,
 ) -> dict[str, Any]:  # fmt: skip
-    """Certifies modules, all of them within three minutes on two cores.
+    """Certifies modules, all of them within ten minutes on two cores.
 
     Args:
         names: Some of ``SUBJECTS``, by default all. Single claims are checked with all only.
@@ -236,14 +238,20 @@ def _claims(single: Sequence[Claim]) -> list[str]:
 
 def draw_figures(rows: Mapping[str, Sequence[Outcome]], out: Path) -> None:
     """Draws ``accuracy_bend.png`` and ``accuracy_nodes.png`` into a folder that exists."""
-    draw(out / "accuracy_bend.png", max(4.2, 2.7 * len(rows)), 5.2, lambda f: _bend(f, rows))
-    draw(out / "accuracy_nodes.png", 9.0, 4.4, lambda f: _nodes(f, rows))
+    abreast, deep = min(len(rows), _ABREAST), -(-len(rows) // _ABREAST)
+    wide, high = max(4.2, 2.7 * abreast), 4.8 * deep + 0.4
+    draw(out / "accuracy_bend.png", wide, high, lambda f: _bend(f, rows))
+    draw(out / "accuracy_nodes.png", 11.0, 5.2, lambda f: _nodes(f, rows))
 
 
 def _bend(figure: Any, rows: Mapping[str, Sequence[Outcome]]) -> None:
     """Error over bend."""
-    axes = figure.subplots(2, len(rows), squeeze=False, sharey="row")
-    for (above, below), (name, every) in zip(axes.T, rows.items(), strict=True):
+    abreast, deep = min(len(rows), _ABREAST), -(-len(rows) // _ABREAST)
+    axes = figure.subplots(2 * deep, abreast, squeeze=False)
+    pairs = axes.reshape(deep, 2, abreast).swapaxes(1, 2).reshape(-1, 2)
+    for axis in pairs[len(rows) :].flat:
+        axis.remove()
+    for (above, below), (name, every) in zip(pairs, rows.items(), strict=False):
         for posture, shade in _SHADES.items():
             for loaded, face in ((True, shade), (False, "none")):
                 some = [(row, gap) for row, gap in _found(every)
@@ -256,9 +264,12 @@ def _bend(figure: Any, rows: Mapping[str, Sequence[Outcome]]) -> None:
             axis.axhline(limit, color="#666666", lw=1, ls="--")
         above.set(title=f"{name}, {_nodes_of(name)} nodes")
         below.set(xlabel="bend [°]")
+    for above, below in pairs[: len(rows) : abreast]:
+        above.set(ylabel="error of the tip [% of L]")
+        below.set(ylabel="error of its rotation [°]")
+    for axis in pairs[: len(rows)].flat:
+        axis.set(ylim=(0.0, None))
     first = axes[0, 0]
-    first.set(ylabel="error of the tip [% of L]", ylim=(0.0, None))
-    axes[1, 0].set(ylabel="error of its rotation [°]", ylim=(0.0, None))
     for posture, shade in _SHADES.items():
         first.scatter([], [], s=16, color=shade, label=posture)
     first.scatter([], [], s=16, edgecolors="#555555", facecolors="none", label="no load")
@@ -282,7 +293,7 @@ def _nodes(figure: Any, rows: Mapping[str, Sequence[Outcome]]) -> None:
         axis.set(xscale="log", yscale="log", xlabel="nodes of a module", ylabel=label)
         axis.set_xticks([8, 16, 32, 64], labels=["8", "16", "32", "64"])
         axis.minorticks_off()
-    axes[0].legend()
+    axes[1].legend(loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize=8, frameon=False)
 
 
 def _nodes_of(name: str) -> str:
