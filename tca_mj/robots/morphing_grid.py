@@ -236,7 +236,8 @@ def morphing_grid(spec: MorphingGridSpec | None = None) -> Part:
         base = _middle(spec, beam.start) + 0.5 * spec.junction * way
         chain = add_chain(
             body, size.body, nodes=size.nodes, name=beam.name, motions=size.motions,
-            pos=axes.T @ (base - origin), quat=matrix_quaternion(axes.T @ frame),
+            pos=(axes.T @ (base - origin)).tolist(),
+            quat=matrix_quaternion(axes.T @ frame).tolist(),
             rgba=(0.0, 0.0, 0.0, 0.0), collide=False,
         )  # fmt: skip
         dress(chain, size, f"{beam.name}.", sides=tuple(SIDES.values()))
