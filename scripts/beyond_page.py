@@ -241,12 +241,12 @@ def size_table() -> str:
 
 def draw_twist(path: Path) -> None:
     """Memorised; soft and twisted; cold, without power; heated again."""
-    spec, shots = TwistMorphingSpec(), []
-    camera = view((0.0, 0.0, 0.032), 0.115, 100.0, -12.0)
+    spec, shots = TwistMorphingSpec(nodes=24), []  # for a tube that looks round
+    camera = view((0.0, 0.0, 0.032), 0.105, 100.0, -12.0)
     course = Course(flagged(twist_morphing_module(spec)))
 
     def shoot() -> None:
-        shots.append(course.shot(camera, 320, 440))
+        shots.append(course.shot(camera, 240, 440))
 
     shoot()
     course.soften()

@@ -138,6 +138,9 @@ BY_NAME: dict[str, Any] = {
 # The same for single surfaces.
 BY_SURFACE: dict[str, dict[str, Any]] = {
     "robots.adaptive_gripper.AdaptiveGripperSpec.angle_for": {"gap": 0.04},
+    "modules.morphing_square.TwistMorphingSpec.temperature_for": {"angle": -0.5},
+    "modules.morphing_square.Morphing3dSpec.temperatures": {"direction": 0.5},
+    "tca.laws.statics.pulling_temperature": {"force": 0.05},
     "rod.beam.Outline": {"half_width": 4e-3, "half_height": 4e-3},
     "control.gait.Gait": {
         "offset": (0.0, 0.5), "start": (0.0, 0.5), "duty": (0.5, 0.5), "hot": (150.0, 150.0),

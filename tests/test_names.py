@@ -38,13 +38,17 @@ INTERNAL = {
         "deadload": "*", "energy": "*", "lie": "*", "problem": "StaticProblem asked",
         "sections": "*", "shooting": "*", "solving": "*",
     },
-    "tca_mj.model": {"curves": "*", "smooth": "*", "spines": "*", "sums": "*", "surface": "*"},
+    "tca_mj.model": {
+        "chain": "hinge_angles", "curves": "*", "smooth": "*", "spines": "*", "sums": "*",
+        "surface": "*",
+    },
     "tca_mj.robots": {
-        "lift": "add_lift", "tetrapod": "add_rail attach_legs dress route_spine_tca trunk",
+        "lift": "add_lift", "morphing_grid": "Beam",
+        "tetrapod": "add_rail attach_legs dress route_spine_tca trunk",
     },
     "tca_mj.modules": {
         "bistable": "BAND_RATIO NYLON_DENSITY NYLON_POISSON RUBBER_MASS SIDES",
-        "morphing": "dress",
+        "morphing": "add_end dress",
     },
     "tca_mj.record": {
         "layout": "*", "plots": "event_rows save_figure", "render": "Closing", "shapes": "*",
