@@ -92,7 +92,8 @@ class Course:
         sim, model = self.sim, self.sim.model
         mujoco.mj_forward(model, sim.data)
         colour_tendons(model, sim.tendon, sim.temperature)
-        heat = np.clip((sim.spines.temperature[0] - _COLD) / 95.0, 0.0, 1.0)
+        warm = float(sim.spines.temperature.max(initial=_COLD))
+        heat = np.clip((warm - _COLD) / 95.0, 0.0, 1.0)
         cold, hot = np.array([0.86, 0.74, 0.48]), np.array([0.9, 0.25, 0.12])
         polymer = [i for i in range(model.ngeom) if "polymer" in model.geom(i).name]
         model.geom_rgba[polymer, :3] = cold + heat * (hot - cold)
@@ -196,18 +197,18 @@ def _row(
 def grid_table(out: Path | None = None) -> str:
     """Shapes of the grid; with ``out`` its picture, too."""
     spec, rows, shots = MorphingGridSpec(), [], []
-    camera = view((0.0, 0.0, 0.004), 0.26, 120.0, -24.0)
+    camera = view((0.0, 0.0, -0.003), 0.185, 125.0, -28.0)
     for name, angles in _GRIDS.items():
         course = Course(morphing_grid(spec))
         if out is not None and not shots:
-            shots.append(course.shot(camera, 420, 320))
+            shots.append(course.shot(camera, 420, 280))
         course.soften()
         course.deform(spec.temperatures(*(math.radians(angle) for angle in angles)))
         soft = 1e3 * places(course.sim, spec)[..., 2]
         course.harden()
         cold = 1e3 * places(course.sim, spec)[..., 2]
         if out is not None:
-            shots.append(course.shot(camera, 420, 320))
+            shots.append(course.shot(camera, 420, 280))
         course.recover()
         left = 1e3 * places(course.sim, spec)[..., 2]
         told = ", ".join(f"{angle:.0f}°" for angle in angles)
@@ -262,14 +263,14 @@ def draw_twist(path: Path) -> None:
 def draw_sides(path: Path) -> None:
     """Fixed to several sides, cold and without power."""
     spec, shots = Morphing3dSpec(), []
-    camera = view((0.0, 0.0, 0.05), 0.27, 120.0, -18.0)
-    for side, angle in ((0.0, 0.0), (0.0, 90.0), (90.0, 90.0), (180.0, 90.0), (300.0, 120.0)):
+    camera = view((0.0, 0.0, 0.045), 0.27, 70.0, -35.0)
+    for side, angle in ((0.0, 0.0), (0.0, 90.0), (120.0, 90.0), (180.0, 90.0), (240.0, 120.0)):
         course = Course(morphing_3d_module(spec))
         if angle:
             course.soften()
             course.deform(spec.temperatures(math.radians(side), math.radians(angle)))
             course.harden()
-        shots.append(course.shot(camera, 360, 400))
+        shots.append(course.shot(camera, 330, 380))
     imageio.imwrite(path, np.concatenate(shots, axis=1))
 
 

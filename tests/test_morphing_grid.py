@@ -98,6 +98,15 @@ def test_a_row_is_certified_as_any_part_and_a_loop_is_refused():
         Seen(solid(morphing_grid(SMALL), 120.0).part)
     with pytest.raises(Outside, match="shape-memory spine"):
         certify_robot(morphing_grid(SMALL))
+    with pytest.raises(Outside, match="which closes a loop"):
+        certify_robot(morphing_grid(SMALL), spine=120.0)
+
+
+def test_a_row_that_is_soft_is_certified_by_one_call():
+    alone = morphing_grid(MorphingGridSpec(rows=1, columns=2))
+    result = certify_robot(alone, spine=120.0, hot=110.0)
+    assert result["within"] and len(result["cases"]) == 8
+    assert max(case["gap"]["position"] for case in result["cases"]) > 1e-4
 
 
 def test_it_keeps_a_saddle_without_power_and_becomes_flat_again():

@@ -19,8 +19,9 @@ from tca_mj.agents.workers import Workers
 from tca_mj.certify.cases import Case
 from tca_mj.certify.outcomes import POSITION, ROTATION, Effort, Outcome, judge
 from tca_mj.certify.rest import Load
+from tca_mj.certify.solid import solid
 from tca_mj.certify.subjects import Subject, read
-from tca_mj.checks import Array, Count, Positive, door, within
+from tca_mj.checks import Array, Count, Positive, Temperature, door, within
 from tca_mj.machine import machine, versions
 from tca_mj.model.chain import MOTIONS
 from tca_mj.model.part import Part
@@ -53,8 +54,8 @@ Answer: TypeAlias = tuple[Asked, Outcome, bool]
 @door
 def certify_robot(
     robot: Part | str, *, hot: ArrayLike = HOT, gravity: ArrayLike | None = None,
-    nodes: Count | None = None, position: Positive = POSITION, rotation: Positive = ROTATION,
-    out: Path | None = None, workers: Count = 1,
+    spine: Temperature | None = None, nodes: Count | None = None, position: Positive = POSITION,
+    rotation: Positive = ROTATION, out: Path | None = None, workers: Count = 1,
 ) -> dict[str, Any]:  # fmt: skip
     """Compares a part at rest with the theory of rods: cold, each TCA hot, each two, and all.
 
@@ -64,6 +65,8 @@ def certify_robot(
         robot: The part, which stays as it is; or ``module:function``, what builds it.
         hot: Temperature of a hot TCA, one for all or one for each, shape (n,) [°C].
         gravity: Gravity, shape (3,); None for that of the part [m/s²].
+        spine: Temperature of its shape-memory spines, which stay at it in their memorised shape;
+            None if it has none [°C].
         nodes: Argument ``nodes`` of the function that builds it; None for its own.
         position: Bound of the error of place of every chain's end, over the length of the chains on
             the way there [1].
@@ -88,10 +91,10 @@ def certify_robot(
         raise ValueError(f"hot must be one temperature or {len(names)}, got {hot!r}")
     down = part.spec.option.gravity if gravity is None else gravity
     down = within("gravity", down, shape=(3,), unit="m/s²")
-    _subject(part)  # refuses what theory does not cover
+    _subject(part, spine)  # refuses what theory does not cover
     asked = list(_asked(names, down))
     begin = time.perf_counter()
-    job = robot, nodes, np.broadcast_to(warm, len(names))
+    job = robot, nodes, np.broadcast_to(warm, len(names)), spine
     found: dict[int, Outcome] = {}
     with (
         Workers(workers if isinstance(robot, str) else 1) as processes,
@@ -143,8 +146,11 @@ def built(text: str, nodes: int | None = None) -> Part:
     return part
 
 
-def _subject(part: Part) -> Subject:
-    return read(part, what=part.spec.modelname)
+def _subject(part: Part, spine: float | None) -> Subject:
+    if spine is None:
+        return read(part, what=part.spec.modelname)
+    springs, beams = solid(part, spine)
+    return read(springs, what=part.spec.modelname, beams=beams)
 
 
 def _asked(names: Sequence[str], gravity: Array) -> Iterator[Asked]:
@@ -160,10 +166,12 @@ def _asked(names: Sequence[str], gravity: Array) -> Iterator[Asked]:
                 yield Asked(hot=some, gravity=field, close=close)
 
 
-def _answer(robot: Part | str, nodes: int | None, hot: Array, asked: Asked) -> Outcome:
+def _answer(
+    robot: Part | str, nodes: int | None, hot: Array, spine: float | None, asked: Asked
+) -> Outcome:
     """The answer to one case."""
     part = robot if isinstance(robot, Part) else built(robot, nodes)
-    subject = _subject(part)
+    subject = _subject(part, spine)
     warm = np.array([tca.name in asked.hot for tca in part.tcas])
     still = np.zeros((len(subject.tips), 3))
     case = Case(

@@ -37,6 +37,8 @@ def add_commands(commands: Commands) -> None:
         nargs="+", metavar="CELSIUS")  # fmt: skip
     add(robot, "--gravity", "x, y and z in m/s²; default: the robot's", type=parse_number, nargs=3,
         metavar=("X", "Y", "Z"))  # fmt: skip
+    add(robot, "--spine", "temperature at which its shape-memory spines stay", type=parse_number,
+        metavar="CELSIUS")  # fmt: skip
     add(robot, "--nodes", "argument of the function; default: its own")
     add(robot, "--tolerance", "of the tip, in %% of the length; default 1", type=above_0,
         metavar="PERCENT")  # fmt: skip
@@ -101,7 +103,8 @@ def _certify(arguments: argparse.Namespace) -> int:
 
     module:function certifies a robot of one's own, what that function returns: cold, each TCA hot,
     each two and all, without gravity and with it. The module is looked for in this folder, too.
-    What the theory does not cover (motors, contact, loops, shape memory) is refused by its name.
+    What the theory does not cover (motors, contact, loops) is refused by its name, and so are
+    spines of shape-memory polymer unless --spine says how hot they are.
 
     Writes into the folder --out:
       report.json          the same as data, case by case
@@ -118,7 +121,7 @@ def _certify(arguments: argparse.Namespace) -> int:
     robots = [name for name in arguments.module if ":" in name]
     if robots:
         return _certify_robots(robots, arguments)
-    named = ("hot", "gravity", "nodes", "tolerance", "angle")
+    named = ("hot", "gravity", "spine", "nodes", "tolerance", "angle")
     given = [f"--{name}" for name in named if getattr(arguments, name) is not None]
     if given:
         raise ValueError(f"{given[0]} is for a robot, module:function")
@@ -143,7 +146,7 @@ def _certify_robots(robots: list[str], arguments: argparse.Namespace) -> int:
     from tca_mj.machine import machine
 
     asked = {"hot": arguments.hot and (arguments.hot if arguments.hot[1:] else arguments.hot[0]),
-             "gravity": arguments.gravity, "nodes": arguments.nodes,
+             "gravity": arguments.gravity, "nodes": arguments.nodes, "spine": arguments.spine,
              "position": arguments.tolerance and arguments.tolerance / 100.0,
              "rotation": arguments.angle and radians(arguments.angle)}  # fmt: skip
     asked = {name: value for name, value in asked.items() if value is not None}
