@@ -25,7 +25,7 @@ INTERNAL = {
     "tca_mj": {
         "actuation": "muscle_group", "bench": "*", "checks": "*", "couple": "*", "files": "*",
         "forks": "*", "hints": "*", "lazy": "*", "machine": "*", "pages": "*", "quadrature": "*",
-        "registry": "Demo", "routes": "require_route", "testing": "*",
+        "registry": "Demo recipes", "routes": "require_route", "testing": "*",
     },
     "tca_mj.smp": {"damage": "damaging", "fixing": "with_glass", "heater": "heated"},
     "tca_mj.tca": {
@@ -77,7 +77,7 @@ INTERNAL = {
     },
     "tca_mj.agents.train": {
         "config": "best_algorithm described", "deep": "Run exported film learner record",
-        "gait_score": "*", "learning_env": "*", "runs": "*", "sb3_env": "silence",
+        "demonstrations": "*", "gait_score": "*", "learning_env": "*", "runs": "*", "sb3_env": "silence",
     },
 }  # fmt: skip
 # Packages that are an arrangement of files: what they have for users, the package above offers.

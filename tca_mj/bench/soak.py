@@ -17,6 +17,7 @@ from __future__ import annotations
 import json
 import math
 import os
+import re
 import sys
 import time
 from collections import Counter
@@ -189,7 +190,7 @@ def _take(env: Any, way: dict[str, Any], random: Random, turn: int, examples: li
     try:
         for seen in (_single if way["way"] == "single" else _vector)(env, random, turn):
             steps += 1
-            kind, hottest = (seen.ending or "").partition(":")[0], np.max(seen.info["temperature"])
+            kind, hottest = _kind(seen.ending or ""), np.max(seen.info["temperature"])
             for fault in _wrong(seen, env):
                 note(fault)
             if seen.ending is not None:
@@ -204,6 +205,11 @@ def _take(env: Any, way: dict[str, Any], random: Random, turn: int, examples: li
         note(type(error).__name__, f", {error}")
     way["steps"] += max(steps, 1)  # a way that fails at once does not go on for ever
     way["endings"], way["faults"] = endings, wrong
+
+
+def _kind(ending: str) -> str:
+    """Why an episode ended, without what differs from one to the next."""
+    return re.sub(r" at [0-9.]+ s", "", ending.partition(":")[0])
 
 
 def _wrong(seen: Seen, env: Any) -> Iterator[str]:
