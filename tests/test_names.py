@@ -77,7 +77,8 @@ INTERNAL = {
     },
     "tca_mj.agents.train": {
         "config": "best_algorithm described", "deep": "Run exported film learner record",
-        "demonstrations": "*", "gait_score": "*", "learning_env": "*", "runs": "*", "sb3_env": "silence",
+        "demonstrations": "*", "gait_score": "*", "learning_env": "*", "runs": "*",
+        "sb3_env": "silence",
     },
 }  # fmt: skip
 # Packages that are an arrangement of files: what they have for users, the package above offers.

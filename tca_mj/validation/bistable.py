@@ -181,7 +181,8 @@ def _jump() -> Finding:
     weight = 9.81 * float(env.model.body_mass.sum())
     return finding(
         "bistable-jump", 1e3 * info["height"], share=100.0 * weight * info["height"] / stored,
-        power=env.max_power, melts=25.0 + 0.3 * env.max_power / float(env.heat.capacity[0]),
+        power=env.max_power,
+        melts=25.0 + 0.3 * env.max_power / float(np.ravel(env.heat.capacity)[0]),
         hottest=hottest, time=heated,
     )  # fmt: skip
 
