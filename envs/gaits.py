@@ -94,7 +94,7 @@ RECIPES = {
     gait: {
         "sac": Recipe(
             steps=steps, control_period=0.4, timestep=10e-3, options={"randomise": 0.2},
-            scaled=True, mirrored=True, growth={"wander": 8000}, discount=0.94, interval=1000,
+            scaled=True, mirrored=True, growth={"wander": 10_000}, discount=0.94, interval=1000,
             start=first, learner=_LEARNER,
         ),
     }
