@@ -263,7 +263,7 @@ def draw_twist(path: Path) -> None:
 def draw_sides(path: Path) -> None:
     """Fixed to several sides, cold and without power."""
     spec, shots = Morphing3dSpec(), []
-    camera = view((0.0, 0.0, 0.045), 0.27, 70.0, -35.0)
+    camera = view((0.0, 0.0, 0.04), 0.23, 70.0, -35.0)
     for side, angle in ((0.0, 0.0), (0.0, 90.0), (120.0, 90.0), (180.0, 90.0), (240.0, 120.0)):
         course = Course(morphing_3d_module(spec))
         if angle:

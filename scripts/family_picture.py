@@ -20,6 +20,7 @@ import tca_mj
 from tca_mj.pages import folder_of_pictures
 
 _COLD, _ABREAST, _PIXELS = 25.0, 5, (400, 340)
+_AWAY = 1.15  # distance of the camera over the diagonal of what it looks at
 _U, _DOME = math.radians(135.0), math.radians(-30.0)
 
 
@@ -30,7 +31,7 @@ class Shown(NamedTuple):
         name: What stands below it.
         build: What builds it.
         hot: Temperatures of its TCAs, or one for all [°C].
-        look: Where the camera looks [m], and from how far [m], from where and how high [deg].
+        look: From where the camera looks, and how high: azimuth and elevation [deg].
         fixed: Bend that each chain with a spine is fixed in, if any [rad].
         soft: Whether its spines are soft while its TCAs are hot, and cold when it is drawn.
     """
@@ -38,7 +39,7 @@ class Shown(NamedTuple):
     name: str
     build: Callable[[], tca_mj.Part]
     hot: float | Sequence[float] = _COLD
-    look: tuple[tuple[float, float, float], float, float, float] = ((0, 0, 0.02), 0.12, 90, -12)
+    look: tuple[float, float] = (90.0, -12.0)
     fixed: float = 0.0
     soft: bool = False
 
@@ -49,27 +50,22 @@ def family() -> tuple[Shown, ...]:
         tca_mj.TwistMorphingSpec(nodes=24), tca_mj.Morphing3dSpec(), tca_mj.MorphingGridSpec()
     )  # fmt: skip
     return (
-        Shown("bending module", tca_mj.bending_module, [105.0, 25.0, 25.0],
-              ((0.008, 0, 0.02), 0.1, 90, -10)),
-        Shown("twisting module", tca_mj.twisting_module, 110.0, ((0, 0, 0.008), 0.05, 70, -15)),
-        Shown("innervated finger", tca_mj.innervated_finger, [95.0, 95.0, 25.0],
-              ((0.008, 0, 0.018), 0.09, 90, -10)),
-        Shown("continuum leg", tca_mj.continuum_leg, [110.0, 25.0, 25.0],
-              ((0, 0, 0.03), 0.13, 60, -10)),
-        Shown("finger pair", tca_mj.finger_pair, 100.0, ((0, 0, 0.006), 0.06, 90, -12)),
-        Shown("arm", tca_mj.arm, _COLD, ((0, 0, 0.09), 0.2, 110, -10)),
-        Shown("gripper", tca_mj.gripper, 60.0, ((0, 0, 0.04), 0.1, 110, -8)),
-        Shown("adaptive gripper", tca_mj.adaptive_gripper, _COLD,
-              ((0, 0, 0.18), 0.36, 105, -8), _U),
-        Shown("tetrapod", tca_mj.tetrapod, _COLD, ((0, 0, 0), 0.34, 125, -22)),
-        Shown("morphing module", tca_mj.morphing_module, _COLD,
-              ((0, -0.03, 0.03), 0.2, 170, -10), _U),
+        Shown("bending module", tca_mj.bending_module, [105.0, 25.0, 25.0], (90, -10)),
+        Shown("twisting module", tca_mj.twisting_module, 110.0, (70, -15)),
+        Shown("innervated finger", tca_mj.innervated_finger, [95.0, 95.0, 25.0], (90, -10)),
+        Shown("continuum leg", tca_mj.continuum_leg, [110.0, 25.0, 25.0], (60, -10)),
+        Shown("finger pair", tca_mj.finger_pair, 100.0, (90, -12)),
+        Shown("arm", tca_mj.arm, _COLD, (110, -10)),
+        Shown("gripper", tca_mj.gripper, 60.0, (110, 5)),
+        Shown("adaptive gripper", tca_mj.adaptive_gripper, _COLD, (105, 0), _U),
+        Shown("tetrapod", tca_mj.tetrapod, _COLD, (125, -22)),
+        Shown("morphing module", tca_mj.morphing_module, _COLD, (170, -10), _U),
         Shown("morphing module that twists", lambda: tca_mj.twist_morphing_module(twist),
-              [twist.temperature_for(-0.5 * math.pi)], ((0, 0, 0.03), 0.1, 100, -12), soft=True),
+              [twist.temperature_for(-0.5 * math.pi)], (100, -12), soft=True),
         Shown("... that bends to any side", lambda: tca_mj.morphing_3d_module(space),
-              space.temperatures(0.6, 1.8), ((0.03, 0.01, 0.035), 0.2, 100, -25), soft=True),
+              space.temperatures(0.6, 1.8), (100, -25), soft=True),
         Shown("grid of morphing modules", lambda: tca_mj.morphing_grid(grid),
-              tuple(grid.temperatures(_DOME, _DOME)), ((0, 0, -0.006), 0.2, 120, -22), soft=True),
+              tuple(grid.temperatures(_DOME, _DOME)), (120, -22), soft=True),
     )  # fmt: skip
 
 
@@ -96,8 +92,11 @@ def drawn(one: Shown) -> np.ndarray:
             power = sim.keep(_COLD + share * (hot - _COLD))
             sim.step(power, 0.1)
         sim.step(power, 1.5)
-    at, *rest = one.look
-    return course.shot(view(at, *rest), *_PIXELS)
+    mujoco.mj_forward(sim.model, sim.data)
+    reach = sim.model.geom_rbound[:, None]
+    low, high = (sim.data.geom_xpos - reach).min(axis=0), (sim.data.geom_xpos + reach).max(axis=0)
+    away = _AWAY * float(np.linalg.norm(high - low))
+    return course.shot(view((low + high) / 2.0, away, *one.look), *_PIXELS)
 
 
 def main() -> None:
