@@ -323,5 +323,6 @@ SUBJECTS: Mapping[str, Callable[[], Subject]] = MappingProxyType({
         (-math.sin(_ACROSS) * _QUARTER / Morphing3dSpec().spine.length,
          math.cos(_ACROSS) * _QUARTER / Morphing3dSpec().spine.length, 0.0), **_STIFF),
     "grid-member": lambda: _grid_member(
-        MorphingGridSpec(rows=1, columns=2), "grid of a single member, soft", **_SOFT),
+        MorphingGridSpec(rows=1, columns=2, member=replace(
+            MorphingGridSpec().member, motions=MOTIONS)), "grid of a single member, soft", **_SOFT),
 })  # fmt: skip
