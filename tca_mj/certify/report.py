@@ -37,7 +37,7 @@ def certify(
     names: Sequence[str] = (), *, out: Path | None = None, effort: Effort = FULL, seed: int = 0,
     workers: int | None = None,
 ) -> dict[str, Any]:  # fmt: skip
-    """Certifies modules, all of them within ten minutes on two cores.
+    """Certifies modules, all of them within half an hour on two cores.
 
     Args:
         names: Some of ``SUBJECTS``, by default all. Single claims are checked with all only.
