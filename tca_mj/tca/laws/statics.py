@@ -147,8 +147,8 @@ def pulling_temperature(
     Example:
         >>> from tca_mj.tca import CATALOGUE, pulling_temperature
         >>> tca = CATALOGUE["free-stroke"]
-        >>> print(f"{pulling_temperature(tca, 1.2 * tca.rest_length, 0.354):.1f} °C")
-        100.0 °C
+        >>> print(f"{pulling_temperature(tca, 1.2 * tca.rest_length, 0.354):.0f} °C")
+        100 °C
     """
 
     def over(temperature: float) -> float:
