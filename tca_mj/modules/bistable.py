@@ -283,7 +283,7 @@ def capstan(model: mujoco.MjModel, name: str, qpos: Array, spec: BistableSpec) -
     Args:
         model: The model, which is changed.
         name: The cable.
-        qpos: Positions of the joints.
+        qpos: Positions of the joints [rad].
         spec: The module, for lever and friction.
     """
     tendon = model.tendon(name).id

@@ -26,7 +26,7 @@ def _module() -> BistableSpec:
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class JumperSpec(Checked):
-    """The jumper.
+    """A jumper: a bistable module on the ground.
 
     Attributes:
         module: The module: one body, a spine of 0.5 mm and 75° (Sun, Section 4.3.4). Its
