@@ -1,5 +1,6 @@
 from tca_mj.envs.adaptive import AdaptiveGrasp, AdaptiveGraspVector
 from tca_mj.envs.arm import ArmPickPlace, ArmPickPlaceVector
+from tca_mj.envs.bistable_grasp import BistableGrasp, BistableGraspVector
 from tca_mj.envs.command import Command, Following, Retelling
 from tca_mj.envs.course import Places, TetrapodCourse, TetrapodCourseVector
 from tca_mj.envs.finger import FingerSense, FingerSenseVector, SensedFinger
@@ -21,12 +22,12 @@ from tca_mj.envs.wrappers import RecordRerun, ScaledObservation, VectorScaledObs
 
 __all__ = [
     "AdaptiveGrasp", "AdaptiveGraspVector", "ArmPickPlace", "ArmPickPlaceVector", "BendReach",
-    "BendReachVector", "Command", "Constant", "Entry", "FingerSense", "FingerSenseVector",
-    "Following", "GaitTask", "Grasp", "GraspVector", "HEATINGS", "Headway", "Jump", "JumpVector",
-    "MorphModule", "MorphModuleVector", "NoDisplay", "NoRest", "Option", "Options", "Places",
-    "Recipe", "RecordRerun", "Retelling", "ScaledObservation", "SensedFinger", "SimulatedTask",
-    "StaticTip", "Table", "TaskArguments", "TaskState", "TaskVector", "TetrapodCourse",
-    "TetrapodCourseVector", "TetrapodGait", "TetrapodGaitVector", "Uniform",
-    "VectorScaledObservation", "Verdict", "ViewerEnvironment", "ViewerPolicy", "hang",
+    "BendReachVector", "BistableGrasp", "BistableGraspVector", "Command", "Constant", "Entry",
+    "FingerSense", "FingerSenseVector", "Following", "GaitTask", "Grasp", "GraspVector", "HEATINGS",
+    "Headway", "Jump", "JumpVector", "MorphModule", "MorphModuleVector", "NoDisplay", "NoRest",
+    "Option", "Options", "Places", "Recipe", "RecordRerun", "Retelling", "ScaledObservation",
+    "SensedFinger", "SimulatedTask", "StaticTip", "Table", "TaskArguments", "TaskState",
+    "TaskVector", "TetrapodCourse", "TetrapodCourseVector", "TetrapodGait", "TetrapodGaitVector",
+    "Uniform", "VectorScaledObservation", "Verdict", "ViewerEnvironment", "ViewerPolicy", "hang",
     "hanging_module", "launch", "need_display", "register_task", "variation_options",
 ]  # fmt: skip

@@ -12,12 +12,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from tca_mj.assets import mjcf
 from tca_mj.checks import door
-from tca_mj.envs.objects import named, stand, touching, weigh
+from tca_mj.envs.holding import HeldObject, held_rows, holding_options
+from tca_mj.envs.objects import stand
 from tca_mj.envs.options import Option, Options, Setup, Uniform, variation_options
-from tca_mj.envs.outcome import TaskState, Verdict
-from tca_mj.envs.rewards import tolerance
 from tca_mj.envs.table import Entry, Table
-from tca_mj.envs.task import SimulatedTask, TaskArguments, parts
+from tca_mj.envs.task import TaskArguments, parts
 from tca_mj.envs.vector import TaskVector
 from tca_mj.model.scene import scene
 from tca_mj.robots.gripper import GripperSpec, gripper
@@ -34,11 +33,7 @@ OBSERVATION = Table(
         Entry("tips of the fingers, x and z", 4, -0.6, 0.6, "m", scale=0.03, mirror=(-3, 4, -1, 2)),
         Entry("object width", 1, 0.0, 0.02, "m", centre=6e-3, scale=2e-3),
         Entry("object mass", 1, 0.0, 0.1, "kg", centre=8e-4, scale=5e-4),
-        Entry("object position", 3, -0.6, 0.6, "m", scale=0.02, mirror=(-1, 2, 3)),
-        Entry("object orientation", 4, -1.0, 1.0, "quaternion wxyz", mirror=(1, 2, -3, -4)),
-        Entry("object velocity", 3, -10.0, 10.0, "m/s", scale=0.05, mirror=(-1, 2, 3)),
-        Entry("time until it is to be held", 1, -3600.0, 60.0, "s", scale=10.0),
-        Entry("time until it is to be let go", 1, -3600.0, 60.0, "s", scale=10.0),
+        *held_rows(60.0),
     ]
 )
 ACTION = Table(
@@ -51,11 +46,8 @@ ACTION = Table(
 WIDTHS, MASSES = (4e-3, 8e-3), (0.3e-3, 1.2e-3)  # of the objects [m, kg]
 STIFFNESSES = (60.0, 2000.0)  # force per change of width [N/m]; 60 N/m is a soft foam's
 _HALF_HEIGHT, _TRAY = 4.5e-3, 10e-3  # of assets/mjcf/block.xml and tray.xml [m]
-_LIFTED = 6e-3  # height above the tray at which an object counts as held [m]
 _ASIDE = 1e-3  # largest offset of the object in x and in y [m]
 _DAMPING = 5e-3  # Kelvin-Voigt time of the object's sides [s]
-_LOST = 0.1  # distance from below the gripper at which it is out of reach [m]
-_FREE = 0.3  # time untouched after which an object is let go [s]
 
 
 def _stiffness(random: np.random.Generator, setup: Setup) -> float:
@@ -72,16 +64,13 @@ _OPTIONS = Options(
         Option(name="object_mass", about="its mass", unit="kg", low=MASSES[0], high=MASSES[1]),
         Option(name="object_position", about="x and y on the tray, from below the gripper",
                unit="m", shape=(2,), low=-_ASIDE, high=_ASIDE, draw=Uniform(-_ASIDE, _ASIDE, 2)),
-        Option(name="hold_from", about="time from which on it is to be held", unit="s",
-               low=11.0, high=20.0, draw=Uniform(11.0, 14.0), drawn="drawn, up to 14"),
-        Option(name="hold_for", about="for how long", unit="s", low=1.0, high=30.0,
-               draw=Uniform(4.0, 10.0), drawn="drawn, from 4 to 10"),
+        *holding_options(11.0, 14.0, 20.0, 30.0),
         *variation_options(),
     ]
 )  # fmt: skip
 
 
-class Grasp(SimulatedTask):
+class Grasp(HeldObject):
     """Hold an object from a commanded time to another one, then let it go.
 
     A normally closed pair of fingers hangs from a base that moves up and down. Its TCA opens it;
@@ -116,9 +105,6 @@ class Grasp(SimulatedTask):
     """
 
     max_power: ClassVar[float] = 10.0  # Sun, Section 4.1.4 [W]
-    release_time: ClassVar[float] = 6.0  # after which the object must have been let go [s]
-    terms = ("reach", "lift", "hold", "goal", "energy", "end")
-    energy_price, end_price = 0.01, 5.0
     camera_prefix = "tray."
     scripted = "tca_mj.agents.scripts.grasp:scripted"
     robot_argument = ("gripper_spec", GripperSpec)
@@ -159,23 +145,20 @@ class Grasp(SimulatedTask):
         )  # fmt: skip
         self._open(sim, seen, ACTION, _OPTIONS, **common)
         self._find(self.model)
-        self.width, self.object_mass = WIDTHS[0], MASSES[0]
-        self.hold_from, self.hold_until = 0.0, 0.0
-        self.held_for, self._untouched = 0.0, 0.0
-        self._progress = self._measure()
+        self.width = WIDTHS[0]
         self._try("gripper_spec", gripper_spec)
 
     def _find(self, model: mujoco.MjModel) -> None:
         """Looks up the addresses of what is observed and set."""
         lift = model.joint("gripper.lift").id
         self._lift_q, self._lift_v = int(model.jnt_qposadr[lift]), int(model.jnt_dofadr[lift])
-        self._tips = [int(model.site(f"gripper.fingers.tip{i}").id) for i in range(2)]
-        free = model.joint("block.free").id
-        self._free_q, self._free_v = int(model.jnt_qposadr[free]), int(model.jnt_dofadr[free])
         self._sides = [int(model.joint(f"block.side{i}").id) for i in range(2)]
-        self._bodies = [int(model.body(f"block.{b}").id) for b in ("block", "side0", "side1")]
-        self._built_mass = float(model.body_mass[self._bodies].sum())
-        self._is_object, self._is_hand = named(model, "block."), named(model, "gripper.")
+        tips = [f"gripper.fingers.tip{i}" for i in range(2)]
+        self._follow(
+            model, "block", ("block", "side0", "side1"), stands=_TRAY + _HALF_HEIGHT,
+            fingers="gripper.", sites=tips,
+        )  # fmt: skip
+        self._tips = self._grip
 
     def prepare(self, setup: Setup) -> None:
         """Puts the gripper up, and makes the object what it is to be."""
@@ -197,71 +180,16 @@ class Grasp(SimulatedTask):
             data.qpos[places] = self.width / 2.0
 
         self.sim.reset(place)
-        self.held_for, self._untouched = 0.0, 0.0
-        self._progress = self._measure()
-
-    def _weigh(self) -> None:
-        weigh(self.model, self._bodies, self.object_mass / self._built_mass)
-
-    def set_state(self, state: TaskState) -> None:
-        """As of all tasks; the object has its mass of then, too."""
-        super().set_state(state)
-        self._weigh()
+        self._begin()
 
     def drive(self, command: NDArray[np.float64]) -> Drive:
         """What the TCA is told and, at once, velocity of the base; see the class."""
         self.data.ctrl[0] = self.gripper_spec.lift.speed * command[1]
         return Drive(command=self.heated(command[:1]))
 
-    @property
-    def height(self) -> float:
-        """Height of the object above where it stands [m]."""
-        return float(self.data.xpos[self._bodies[0], 2]) - _TRAY - _HALF_HEIGHT
-
-    @property
-    def touched(self) -> bool:
-        """Whether a finger touches the object."""
-        return touching(self.data, self._is_object, self._is_hand)
-
-    @property
-    def held(self) -> bool:
-        """Whether the object is held."""
-        return self.height >= _LIFTED and self.touched
-
-    def judge(self, drive: Drive, harmed: bool) -> Verdict:
-        """Whether the object is held when it should be, and let go after that."""
-        before, self._progress = self._progress, self._measure()
-        terms = {name: value - before[name] for name, value in self._progress.items()}
-        now, due = self.sim.time, self.hold_until - self.hold_from
-        wanted = self.hold_from - 1e-9 < now < self.hold_until + 1e-9
-        held, ended, success = self.held, None, False
-        self._untouched = 0.0 if self.touched else self._untouched + self.interval
-        if wanted and held:
-            self.held_for += self.interval
-        elif wanted:
-            ended = f"not held at {now:.1f} s"
-        elif now > self.hold_until:
-            success = self._untouched > _FREE - 1e-9 and not harmed
-            late = now > self.hold_until + self.release_time + 1e-9
-            ended = f"not let go at {now:.1f} s" if late and not success else None
-        if math.hypot(*self.data.xpos[self._bodies[0], :2]) > _LOST and not success:
-            ended = ended or "object out of reach"
-        terms["hold"] = 10.0 * self.interval / due if wanted and held else 0.0
-        terms["goal"] = 20.0 if success else 0.0
-        return Verdict(terms=terms, success=success, ended=None if harmed else ended)
-
-    def _measure(self) -> dict[str, float]:
-        """How far the task has got, by reward term."""
-        data = self.data
-        middle = data.site_xpos[self._tips].mean(axis=0)
-        gap = math.dist(middle, data.xpos[self._bodies[0]])
-        near = float(tolerance(gap, bounds=(0.0, 4e-3), margin=0.03))
-        return {"reach": near, "lift": 4.0 * min(max(self.height / _LIFTED, 0.0), 1.0)}
-
     def observe(self) -> dict[str, ArrayLike]:
         """See ``OBSERVATION``."""
         data, sim = self.data, self.sim
-        turn = data.qpos[self._free_q + 3 : self._free_q + 7]
         return {
             "base height": data.qpos[self._lift_q],
             "base velocity": data.qvel[self._lift_v],
@@ -272,23 +200,12 @@ class Grasp(SimulatedTask):
             "tips of the fingers, x and z": data.site_xpos[self._tips][:, [0, 2]].ravel(),
             "object width": self.width,
             "object mass": self.object_mass,
-            "object position": data.xpos[self._bodies[0]],
-            "object orientation": turn if turn[0] >= 0.0 else -turn,
-            "object velocity": data.qvel[self._free_v : self._free_v + 3],
-            "time until it is to be held": self.hold_from - sim.time,
-            "time until it is to be let go": self.hold_until - sim.time,
+            **self.seen_of_it(),
         }
-
-    def details(self) -> dict[str, Any]:
-        """Height of the object [m], whether a finger touches it, and for how long it was held."""
-        return {"height": self.height, "touched": self.touched, "held_for": self.held_for}
 
     def outcome(self) -> dict[str, Any]:
         """What the object was, and for how long it was held when it should be [s]."""
-        return {
-            "width": self.width, "object_mass": self.object_mass, "held_for": self.held_for,
-            "hold_from": self.hold_from, "hold_until": self.hold_until,
-        }  # fmt: skip
+        return {"width": self.width, **super().outcome()}
 
 
 GraspVector = partial(TaskVector, Grasp)  # several, stepped together

@@ -26,6 +26,7 @@ from tca_mj.record.recorder import Recorder
 from tca_mj.registry import TASKS, Task, episode_steps, find_task, make, register, task_class
 from tca_mj.robots.adaptive_gripper import AdaptiveGripperSpec, adaptive_gripper
 from tca_mj.robots.arm import ArmSpec, arm
+from tca_mj.robots.bistable_gripper import BistableGripperSpec, bistable_gripper
 from tca_mj.robots.gripper import GripperSpec, gripper
 from tca_mj.robots.jumper import JumperSpec, jumper
 from tca_mj.robots.morphing_grid import MorphingGridSpec, morphing_grid
@@ -42,17 +43,18 @@ from tca_mj.variation import Nominal, Variation
 
 __version__: str
 __all__ = [
-    "AdaptiveGripperSpec", "ArmSpec", "BeamSpec", "BendingSpec", "BistableSpec", "CATALOGUE",
-    "Chain", "Drive", "FibreSpec", "Film", "FingerPairSpec", "GripperSpec", "Group", "Haste",
-    "Helix", "InnervatedFingerSpec", "JumperSpec", "LegSpec", "MixedBank", "MixedState",
-    "Morphing3dSpec", "MorphingGridSpec", "MorphingSpec", "Muscle", "MuscleBank", "Nominal",
-    "Outline", "Part", "Recorder", "Route", "RoutedTca", "Simulation", "SimulationBatch",
-    "SimulationDiverged", "SimulationOverheated", "SimulationState", "SoftFingerSpec", "Supply",
-    "TASKS", "Task", "TcaBank", "TcaSpec", "TetrapodSpec", "Thermostat", "TwistMorphingSpec",
-    "TwistingSpec", "UTurn", "Variation", "adaptive_gripper", "add_chain", "add_tca", "arm",
-    "bending_module", "bistable_module", "continuum_leg", "episode_steps", "export", "find_task",
-    "finger_pair", "frozen", "get_state", "gripper", "in_arena", "innervated_finger", "jumper",
-    "leg_length", "make", "morphing_3d_module", "morphing_grid", "morphing_module", "new_spec",
-    "parallel", "register", "register_task", "rigid_tetrapod", "scene", "set_state", "soft_finger",
-    "stage", "task_class", "tetrapod", "twist_morphing_module", "twisting_module",
+    "AdaptiveGripperSpec", "ArmSpec", "BeamSpec", "BendingSpec", "BistableGripperSpec",
+    "BistableSpec", "CATALOGUE", "Chain", "Drive", "FibreSpec", "Film", "FingerPairSpec",
+    "GripperSpec", "Group", "Haste", "Helix", "InnervatedFingerSpec", "JumperSpec", "LegSpec",
+    "MixedBank", "MixedState", "Morphing3dSpec", "MorphingGridSpec", "MorphingSpec", "Muscle",
+    "MuscleBank", "Nominal", "Outline", "Part", "Recorder", "Route", "RoutedTca", "Simulation",
+    "SimulationBatch", "SimulationDiverged", "SimulationOverheated", "SimulationState",
+    "SoftFingerSpec", "Supply", "TASKS", "Task", "TcaBank", "TcaSpec", "TetrapodSpec", "Thermostat",
+    "TwistMorphingSpec", "TwistingSpec", "UTurn", "Variation", "adaptive_gripper", "add_chain",
+    "add_tca", "arm", "bending_module", "bistable_gripper", "bistable_module", "continuum_leg",
+    "episode_steps", "export", "find_task", "finger_pair", "frozen", "get_state", "gripper",
+    "in_arena", "innervated_finger", "jumper", "leg_length", "make", "morphing_3d_module",
+    "morphing_grid", "morphing_module", "new_spec", "parallel", "register", "register_task",
+    "rigid_tetrapod", "scene", "set_state", "soft_finger", "stage", "task_class", "tetrapod",
+    "twist_morphing_module", "twisting_module",
 ]  # fmt: skip

@@ -89,6 +89,11 @@ TASKS = (
         max_episode_steps=1200,
     ),
     Task(
+        id="TCA/BistableGrasp-v0",
+        entry_point="tca_mj.envs.bistable_grasp:BistableGrasp",
+        max_episode_steps=2000,
+    ),
+    Task(
         id="TCA/Jump-v0",
         entry_point="tca_mj.envs.jump:Jump",
         max_episode_steps=150,
@@ -145,6 +150,7 @@ _SHOWN = (
     Demo(name="pick-and-place", task="TCA/ArmPickPlace-v0"),
     Demo(name="grasp", task="TCA/Grasp-v0"),
     Demo(name="adaptive-grasp", task="TCA/AdaptiveGrasp-v0"),
+    Demo(name="bistable-grasp", task="TCA/BistableGrasp-v0"),
     Demo(name="tetrapod", task="TCA/TetrapodCourse-v0"),
     Demo(name="finger", task="TCA/FingerSense-v0"),
     Demo(name="jump", task="TCA/Jump-v0"),

@@ -218,6 +218,9 @@ BY_SURFACE: dict[str, dict[str, Any]] = {
         "env": lambda: task_env("TCA/TetrapodWalk-v0", action="power"), "steering": 0.0,
     },
     "agents.scripts.arm.scripted": {"task": lambda: task_env("TCA/ArmPickPlace-v0").unwrapped},
+    "agents.scripts.bistable_grasp.scripted": {
+        "task": lambda: task_env("TCA/BistableGrasp-v0").unwrapped,
+    },
     "agents.scripts.finger.scripted": {"task": lambda: task_env("TCA/FingerSense-v0").unwrapped},
     "agents.scripts.jump.scripted": {"task": lambda: task_env("TCA/Jump-v0").unwrapped},
     "agents.scripts.morph.scripted": {"task": lambda: task_env("TCA/MorphModule-v0").unwrapped},

@@ -83,6 +83,7 @@ NO_DOOR = {
             "agents.scripts.course.CourseWalker", "agents.policies.gait.GaitPolicy.told_of",
             "agents.scripts.adaptive.AdaptivePolicy.act", "agents.scripts.grasp.GraspPolicy.act",
             "agents.scripts.jump.JumpPolicy.act",
+            "agents.scripts.bistable_grasp.BistableGraspPolicy.act",
             "envs.wrappers.*", "envs.table.Table.scaled", "envs.table.Table.mirrored",
             "envs.table.Table.read", "envs.table.Table.outside", "envs.table.Table.bounded",
             "envs.task", "envs.vector", "agents.train.sb3_env.*", "agents.policies.actors.Blind",

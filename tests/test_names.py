@@ -43,7 +43,7 @@ INTERNAL = {
         "surface": "*",
     },
     "tca_mj.robots": {
-        "lift": "add_lift", "morphing_grid": "Beam",
+        "lift": "add_bridge add_lift", "morphing_grid": "Beam",
         "tetrapod": "add_rail attach_legs dress route_spine_tca trunk",
     },
     "tca_mj.modules": {
@@ -58,7 +58,8 @@ INTERNAL = {
     "tca_mj.envs": {
         "adaptive": "OBJECTS Thing", "command": "command_options commanded drawn",
         "options": "variation_of",
-        "objects": "*", "outcome": "broken_off finite harm how_it_ended measured together",
+        "holding": "*", "objects": "*",
+        "outcome": "broken_off finite harm how_it_ended measured together",
         "rewards": "*",
         "stance": "*", "table": "commands", "task": "parts",
     },
@@ -71,8 +72,9 @@ INTERNAL = {
     },
     "tca_mj.agents.scripts": {
         # one for each task, found by the task's ``scripted``
-        "adaptive": "scripted", "arm": "scripted", "finger": "Run calibrate scripted",
-        "grasp": "scripted", "jump": "scripted", "morph": "calibrate scripted",
+        "adaptive": "scripted", "arm": "scripted", "bistable_grasp": "scripted",
+        "finger": "Run calibrate scripted", "grasp": "scripted", "jump": "scripted",
+        "morph": "calibrate scripted",
         "reach": "scripted", "tetrapod": "scripted",
     },
     "tca_mj.agents.train": {

@@ -186,7 +186,10 @@ class BistableSpec(Checked):
 
 @door
 def bistable_module(
-    spec: BistableSpec | None = None, *, drive: Literal["tcas", "cables"] = "tcas"
+    spec: BistableSpec | None = None,
+    *,
+    drive: Literal["tcas", "cables"] = "tcas",
+    collide: bool = True,
 ) -> Part:
     """Builds the module: clamped at the origin, its axis along z at the base, curved to +x.
 
@@ -194,6 +197,7 @@ def bistable_module(
         spec: The module, by default a finger of the published gripper.
         drive: What lies in the channels. A cable is a tendon with the actuator of its name, whose
             control is its tension [N].
+        collide: Whether its two bodies touch objects and ground.
 
     Returns:
         A part with the TCAs, or cables, ``to1`` and ``to2``, which pull to the state of this
@@ -214,7 +218,7 @@ def bistable_module(
     snapping(part.spec)
     chain = add_chain(
         part, spec.drawn, nodes=spec.nodes, name="body", motions=spec.motions,
-        collide=spec.bodies == 2, friction=(spec.grip, 0.005, 0.0001),
+        collide=collide and spec.bodies == 2, friction=(spec.grip, 0.005, 0.0001),
         rgba=(0.93, 0.93, 0.9, 0.45 if spec.bodies == 2 else 0.0),
     )  # fmt: skip
     chain.pieces[0].add_site(name="base", group=4)

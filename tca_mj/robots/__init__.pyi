@@ -1,5 +1,6 @@
 from tca_mj.robots.adaptive_gripper import AdaptiveGripperSpec, hardened_gripper
 from tca_mj.robots.arm import ArmSpec
+from tca_mj.robots.bistable_gripper import BistableGripperSpec, bistable_hand
 from tca_mj.robots.gripper import GripperSpec
 from tca_mj.robots.jumper import JumperSpec
 from tca_mj.robots.lift import LiftSpec
@@ -8,7 +9,7 @@ from tca_mj.robots.tetrapod import LEGS, SIDES, SPINES, TetrapodSpec, rigid_tetr
 from tca_mj.robots.tetrapod_fine import fine_tetrapod
 
 __all__ = [
-    "AdaptiveGripperSpec", "ArmSpec", "GripperSpec", "JumperSpec", "LEGS", "LiftSpec",
-    "MorphingGridSpec", "SIDES", "SPINES", "TetrapodSpec", "fine_tetrapod", "hardened_gripper",
-    "rigid_tetrapod", "set_rigid_bend",
+    "AdaptiveGripperSpec", "ArmSpec", "BistableGripperSpec", "GripperSpec", "JumperSpec", "LEGS",
+    "LiftSpec", "MorphingGridSpec", "SIDES", "SPINES", "TetrapodSpec", "bistable_hand",
+    "fine_tetrapod", "hardened_gripper", "rigid_tetrapod", "set_rigid_bend",
 ]  # fmt: skip

@@ -79,7 +79,7 @@ class BandedRod(Checked):
     length: Positive
     stiffness: Positive
     angle: Angle
-    band: Positive
+    band: NotNegative
     band_length: Positive
     force: tuple[float, float] = (0.0, 0.0)
 

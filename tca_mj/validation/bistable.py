@@ -18,6 +18,7 @@ from tca_mj.agents.scripts.jump import JumpPolicy
 from tca_mj.checks import Array
 from tca_mj.envs.jump import Jump
 from tca_mj.modules.bistable import BistableSpec, bistable_module, capstan, shaped
+from tca_mj.validation.carrying import findings as carrying
 from tca_mj.validation.facts import Finding, finding
 
 ANGLES = (45.0, 50.0, 65.0, 75.0, 100.0)  # of the five spines, Sun, Fig. 4.14b [deg]
@@ -212,6 +213,7 @@ def findings(*, full: bool = True) -> list[Finding]:
         more = triggering(rubbed, 2) - float(force[1, 0])
         rows.append(finding("triggering-friction", more, more > 0.0, friction=rubbed.friction))
         rows.append(_jump())
-    rows.append(finding("bistable-hold"))
+    if full:
+        rows += carrying()
     weight = 2e3 * (spec.body.mass + 2.0 * spec.embedded.of_length(0.1).mass)
     return [*rows, finding("bistable-weight", weight)]
