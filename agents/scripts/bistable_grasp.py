@@ -22,6 +22,8 @@ class BistableGraspGains(Checked):
 
     Attributes:
         below: How far below the fingers' roots the object's middle is when they close [m].
+        set_down: The same when they open: pushed down from where they carry it, they no longer
+            press it from below, and need not slide along it [m].
         over: Bend beyond which a finger has gone over, either way [rad].
         lifted: Height to which the object is lifted [m].
         near: Error of a place that is small enough [m].
@@ -35,6 +37,7 @@ class BistableGraspGains(Checked):
     """
 
     below: NotNegative = 22e-3
+    set_down: NotNegative = 16e-3
     over: Angle = 0.3
     lifted: NotNegative = 12e-3
     near: NotNegative = 0.5e-3
@@ -98,7 +101,7 @@ class BistableGraspPolicy(Checked):
             case "carry":
                 return np.array([goal - y, ground + gains.lifted - z])
             case "set down":
-                return np.array([goal - y, ground - 0.3e-3 - z])
+                return np.array([goal - y, ground + gains.set_down - hand[1]])
             case "leave":
                 return np.array([0.0, self.gripper_spec.lift.travel[1] - hand[1]])
         return np.zeros(2)

@@ -42,7 +42,7 @@ class BistableGripperSpec(Checked):
     finger: BistableSpec = field(default_factory=BistableSpec)
     spacing: Length = 30e-3
     lift: LiftSpec = field(
-        default_factory=lambda: LiftSpec(height=0.085, travel=(0.055, 0.12), speed=0.04)
+        default_factory=lambda: LiftSpec(height=0.085, travel=(0.05, 0.12), speed=0.04)
     )
     across: Length = 0.06
     across_speed: Positive = 0.04
