@@ -72,7 +72,7 @@ class HeldObject(SimulatedTask):
 
     release_time: ClassVar[float] = 6.0  # after which the object must have been let go [s]
     near: ClassVar[tuple[float, float]] = (4e-3, 0.03)
-    terms = ("reach", "lift", "hold", "goal", "energy", "end")
+    terms: ClassVar[tuple[str, ...]] = ("reach", "lift", "hold", "goal", "energy", "end")
     energy_price, end_price = 0.01, 5.0
 
     def _follow(
