@@ -100,9 +100,9 @@ class BistableGrasp(HeldObject):
     goal and times. ``options`` is the table of all that can be given.
 
     Terminates when the object has been let go within 10 s of the commanded time, standing within
-    5 mm of the goal (success) or elsewhere, when it is not held when it should be, or not let go in
-    time. Truncates after the time limit, and with ``info["truncation_reason"]`` if a TCA is too
-    hot or torn, or if the simulation diverged.
+    5 mm of the goal (success) or elsewhere, when it is not held when it should be, not let go in
+    time, or out of reach. Truncates after the time limit, and with ``info["truncation_reason"]`` if
+    a TCA is too hot or torn, or if the simulation diverged.
     """
 
     max_power: ClassVar[float] = 15.0  # of 1.5 A in 94 mm, Sun, Sections 4.3.4 and 2.3.1 [W]

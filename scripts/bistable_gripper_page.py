@@ -4,7 +4,6 @@
     python scripts/bistable_gripper_page.py --tables     prints the tables; minutes of one core
 """
 
-import argparse
 import math
 from pathlib import Path
 from typing import Any
@@ -17,7 +16,6 @@ from tca_mj.agents.scripts.bistable_grasp import BistableGraspPolicy
 from tca_mj.envs.bistable_grasp import BistableGrasp
 from tca_mj.validation.carrying import limit_load, without_bands
 
-PICTURES = Path(__file__).resolve().parent.parent / "docs" / "pictures"
 SEEDS = range(10)
 MOMENTS = {"lower": 0.1, "calm": 0.3, "carry": 4.0, "leave": 0.8}  # after a phase begins [s]
 NOMINAL = {"tca_gain": 1.0, "heat_loss": 1.0, "ambient": 25.0}
@@ -78,15 +76,14 @@ def picture(path: Path) -> None:
     imageio.imwrite(path, np.concatenate(list(panels.values()), axis=1))
 
 
-def main(argv: list[str] | None = None) -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--tables", action="store_true")
-    if parser.parse_args(argv).tables:
+def main() -> None:
+    out = pages.folder_of_pictures(__doc__, Path("docs/pictures"))
+    if out is None:
         heads = ["seed", "friction, mass", "held [s]", "energy to close, hold, open [J]",
                  "hottest [°C]", "from the goal [mm]", "end"]  # fmt: skip
         print(limits(), "\n".join(pages.table(heads, [run(seed) for seed in SEEDS])), sep="\n\n")
     else:
-        picture(PICTURES / "bistable-gripper.png")
+        picture(out / "bistable-gripper.png")
 
 
 if __name__ == "__main__":

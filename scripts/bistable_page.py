@@ -4,7 +4,6 @@
     python scripts/bistable_page.py --tables    prints the tables
 """
 
-import argparse
 import math
 from dataclasses import replace
 from pathlib import Path
@@ -14,12 +13,11 @@ import matplotlib.pyplot as plt
 import mujoco
 import numpy as np
 
-from tca_mj import BistableSpec
+from tca_mj import BistableSpec, pages
 from tca_mj.agents.scripts.jump import JumpPolicy
 from tca_mj.envs.jump import Jump
 from tca_mj.validation.bistable import ANGLES, Snap, landscape, lines, snap
 
-PICTURES = Path(__file__).resolve().parent.parent / "docs" / "pictures"
 SPEC = BistableSpec()
 KINDS = {"symmetric": 0.0, "asymmetric": 50.0, "monostable": 110.0}  # angle of the spine [deg]
 
@@ -29,7 +27,7 @@ def at(angle: float) -> BistableSpec:
     return replace(SPEC, angle=math.radians(angle))
 
 
-def forces() -> None:
+def forces(folder: Path) -> None:
     """Energy landscapes and triggering forces by arc, by theory and by MuJoCo."""
     figure, axes = plt.subplots(1, 4, figsize=(14, 3.4))
     bends = np.radians(np.linspace(-150.0, 150.0, 61))
@@ -51,10 +49,10 @@ def forces() -> None:
     axes[3].set(title="triggering forces", xlabel="θ0 [°]", ylabel="tension of a cable [N]")
     axes[3].legend(fontsize=7)
     figure.tight_layout()
-    figure.savefig(PICTURES / "bistable.png", dpi=110)
+    figure.savefig(folder / "bistable.png", dpi=110)
 
 
-def jumping() -> None:
+def jumping(folder: Path) -> None:
     """Four moments of a jump."""
     env, policy, pictures = Jump(render_mode="rgb_array", size=(400, 360)), JumpPolicy(), []
     observation, _ = env.reset(seed=0)
@@ -65,7 +63,7 @@ def jumping() -> None:
         ended = terminated or truncated
     last = len(pictures) - 1
     shown = [pictures[i] for i in (0, last - 4, last - 3, last)]
-    imageio.imwrite(PICTURES / "jump.png", np.concatenate(shown, axis=1))
+    imageio.imwrite(folder / "jump.png", np.concatenate(shown, axis=1))
 
 
 def tables() -> str:
@@ -93,10 +91,9 @@ def tables() -> str:
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--tables", action="store_true")
-    if parser.parse_args().tables:
+    folder = pages.folder_of_pictures(__doc__, Path("docs/pictures"))
+    if folder is None:
         print(tables())
     else:
-        forces()
-        jumping()
+        forces(folder)
+        jumping(folder)

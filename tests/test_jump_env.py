@@ -119,6 +119,22 @@ def test_a_batch_snaps_like_one(shared):
     assert hurried and left.bent() > 1.5 and right.bent() < 0.0
 
 
+def test_a_state_before_the_snap_leads_to_the_same_jump(shared):
+    """Haste keeps nothing of its own, and leaves the model's steps as they were."""
+    shared.reset(seed=4)
+    own = shared.model.opt.timestep, shared.model.opt.integrator
+    while shared.bent() < -0.8:
+        shared.step(-OFF)
+    state, ends = shared.get_state(), []
+    for _ in range(2):
+        shared.set_state(state)
+        for _ in range(4):
+            shared.step(-OFF)
+        ends.append(shared.data.qpos.tobytes())
+    assert ends[0] == ends[1] and shared.bent() > 0.5
+    assert (shared.model.opt.timestep, shared.model.opt.integrator) == own
+
+
 @pytest.mark.parametrize(
     ("given", "message"),
     [
