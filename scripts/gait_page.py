@@ -218,7 +218,7 @@ def page(results: dict[str, dict[str, Any]], notes: str) -> str:
     return "\n".join([*lines, notes])
 
 
-BY_HAND = "## What was tried"
+BY_HAND = "## What the policies do"
 
 
 def main(argv: list[str] | None = None) -> None:
