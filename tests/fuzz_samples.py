@@ -160,6 +160,7 @@ BY_SURFACE: dict[str, dict[str, Any]] = {
         {"path": lambda: _model_file()},
     ),
     "record.reader.read": {"path": lambda: recorded()},
+    "sim.Haste": {"timestep": 1e-4, "tca_period": 1e-3},
     "sim.Simulation.bend": {"chains": "body"},
     "sim.Simulation.keep": {"temperature": [60.0] * 3},
     "sim.Simulation.rest": {"temperature": [30.0] * 3},

@@ -47,7 +47,7 @@ INTERNAL = {
         "tetrapod": "add_rail attach_legs dress route_spine_tca trunk",
     },
     "tca_mj.modules": {
-        "bistable": "BAND_RATIO NYLON_DENSITY NYLON_POISSON RUBBER_MASS SIDES",
+        "bistable": "BAND_RATIO NYLON_DENSITY NYLON_POISSON RUBBER_MASS SIDES capstan",
         "morphing": "add_end dress",
     },
     "tca_mj.record": {
