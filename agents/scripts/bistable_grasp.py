@@ -28,7 +28,7 @@ class BistableGraspGains(Checked):
         lifted: Height to which the object is lifted [m].
         near: Error of a place that is small enough [m].
         climb_rate: Velocity of the carriage over the missing way [1/s].
-        carry_speed: Largest velocity with an object, over the carriage's.
+        carry_speed: Largest velocity with an object, over the carriage's [1].
         calm: Time in which the fingers come to rest after a snap [s].
         phase_limit: Time after which a phase is given up for the next one [s].
 
