@@ -57,8 +57,8 @@ python scripts/gait_page.py
 Everybody walks the same 16 robots, whose friction, mass, TCA gain and heat loss are off by up to
 20 % and whose surroundings by up to 5 K (seeds 1000 to 1015), for 60 s from cold, at the task's own
 time step; *nominal* is one robot that is off by nothing. A policy is the best of its run by the
-run's own evaluations, on five robots with other seeds, which differ from run to run; the curves show
-those. In brackets the 95 % interval of the mean, by
+run's own evaluations, on five robots with other seeds, which differ from run to run; the curves
+show those. In brackets the 95 % interval of the mean, by
 Student's t: over seeds for the mean of five, over robots for a single policy.
 """
 
