@@ -35,7 +35,8 @@ Without a screen you can
 def add_commands(commands: Commands) -> None:
     """Adds demo, export, list and view."""
     demo = add_command(commands, "demo", _demo, help="run a demo and record it")
-    add(demo, "name", "which demo", nargs="?", choices=list(DEMOS))
+    add(demo, "name", f"which demo: {', '.join(DEMOS)}", nargs="?", choices=list(DEMOS),
+        metavar="NAME")  # fmt: skip
     add(demo, "--policy", f"{', '.join(POLICIES)}, a shipped one, a file or a run")
     add(demo, "--task", "the policy's task")
     add(demo, "--out", "folder; default runs/demo/TASK")
