@@ -257,4 +257,5 @@ def test_every_demo_begins(name):
     summary = play(
         demo.task, demo.policy, arguments=dict(demo.arguments), max_duration=0.4, progress=False
     )
-    assert summary["duration"] >= 0.4 and summary["phases"] and "diverged" not in summary["ending"]
+    assert summary["duration"] >= 0.4 or summary["success"]  # a jump is over sooner
+    assert summary["phases"] and "diverged" not in summary["ending"]
