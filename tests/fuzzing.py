@@ -64,7 +64,8 @@ NO_DOOR = {
         (
             "tca.laws.rod.CoilRods.unsoftened", "tca.laws.rod.CoilRods.finished",
             "tca.laws.rod.CoilRods.torsion_per_tension", "tca.thermal.HeatStep.advance",
-            "sim.Simulation.take", "tca.dynamics.stepping.LoadedTcas.heated",
+            "sim.Simulation.take", "sim.Simulation.snaps",
+            "tca.dynamics.stepping.LoadedTcas.heated",
             "tca.dynamics.stepping.LoadedTcas.pull", "tca.supply.Supply.power",
             "tca.dynamics.stepping.LoadedTcas.check_domain", "tca.bank.TcaBank.pulls",
             "tca.supply.Supply.like", "actuation",
