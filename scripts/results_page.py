@@ -140,8 +140,8 @@ def table(task: str, found: dict[str, dict[str, Any]]) -> list[str]:
 
 
 def factors(found: dict[str, dict[str, Any]]) -> list[str]:
-    """The table of single factors of a task, as Markdown; empty if there is none."""
-    known = {policy: each for policy, each in found.items() if not FACTORS.keys().isdisjoint(each)}
+    """The table of single factors of a task, as Markdown; empty if none was looked at whole."""
+    known = {policy: each for policy, each in found.items() if FACTORS.keys() <= each.keys()}
     if not known:
         return []
     lines = [f"| speed [mm/s] | {' | '.join(known)} |", "|---" * (1 + len(known)) + "|"]
