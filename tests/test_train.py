@@ -117,7 +117,7 @@ def walking(**change):
 
 @pytest.mark.usefixtures("quiet")
 def test_a_gait_makes_the_first_steps(tmp_path):
-    config = walking()
+    config = walking(options={"wander": 1.0}, retold=True)
     with closing(Run(config, RunFolder(tmp_path / "run", config, ""))) as run:
         run.demonstrate()
         memory, task = run.model.replay_buffer, run.env.venv.tasks.envs[0]
@@ -128,6 +128,7 @@ def test_a_gait_makes_the_first_steps(tmp_path):
         off = np.abs(told[..., None, :] - levels).min(axis=-2) / ((172.0 - 25.0) / 2.0)
         assert 0.08 < off.mean() < 0.15  # noise with a spread of 0.15, cut off at 172 °C
         np.testing.assert_allclose(task.heated(task.asking(hot[0])), hot[0], rtol=1e-13)
+        assert not memory._ways.any()  # the learner's episodes gain nothing from the gait's
         # In the middle of a cycle some TCAs are hot, others are not, and tasks are not in step.
         assert (memory.actions[:20].std(axis=(0, 1)) > 0.3).all()
         assert np.abs(memory.actions[0, 0] - memory.actions[0, 1]).max() > 1.0

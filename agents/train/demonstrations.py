@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from stable_baselines3.common.base_class import BaseAlgorithm
 
+from tca_mj.agents.train.mirrored import MirroredReplayBuffer
 from tca_mj.control import Gait
 from tca_mj.envs.task import SimulatedTask
 
@@ -56,6 +57,8 @@ def demonstrate(
         memory.add(seen, last, actions, rewards, dones, infos)
         seen = after
         model.num_timesteps += len(tasks)
+    if isinstance(memory, MirroredReplayBuffer):
+        memory.begin()  # the learner resets the tasks
 
 
 def _asked(task: SimulatedTask, gait: Gait, phase: float, pace: float) -> NDArray[np.float64]:

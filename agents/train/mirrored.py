@@ -60,6 +60,10 @@ class MirroredReplayBuffer(ReplayBuffer):
         self._notes = np.zeros((self.buffer_size, self.n_envs, 3))
         self._ways = np.zeros((self.n_envs, 2))  # along and across at the last step
 
+    def begin(self) -> None:
+        """All environments begin anew: what they gain counts from there."""
+        self._ways[:] = 0.0
+
     def add(self, obs: Any, next_obs: Any, action: Any, reward: Any, done: Any, infos: Any) -> None:
         """Keeps a step of every environment."""
         if self._retelling is not None:
