@@ -6,10 +6,10 @@
 
 import math
 from pathlib import Path
-from typing import Any
 
 import imageio.v3 as imageio
 import numpy as np
+from grasp_page import filmed
 
 from tca_mj import BistableGripperSpec, pages
 from tca_mj.agents.scripts.bistable_grasp import BistableGraspPolicy
@@ -62,14 +62,7 @@ def picture(path: Path) -> None:
     env = BistableGrasp(render_mode="rgb_array", size=(400, 440), camera="side")
     policy = BistableGraspPolicy()
     observation, _ = env.reset(seed=0, options={"object_mass": 15e-3, "goal": 30e-3})
-    panels: dict[str, Any] = {}
-    ended = False
-    while not ended:
-        action = policy.act(observation)
-        if policy.phase not in panels and policy.since >= MOMENTS.get(policy.phase, math.inf):
-            panels[policy.phase] = env.render()
-        observation, _, terminated, truncated, _ = env.step(action)
-        ended = terminated or truncated
+    panels = filmed(env, policy, observation, MOMENTS)
     if "leave" not in panels:
         panels["leave"] = env.render()
     env.close()

@@ -85,18 +85,26 @@ def forces() -> str:
     return "\n".join(pages.table(heads, rows))
 
 
-def picture(path: Path) -> None:
-    """Open, closed, holding, and letting go."""
-    env, policy = Grasp(render_mode="rgb_array", size=(400, 440)), GraspPolicy()
-    observation, _ = env.reset(seed=3, options={"width": 7e-3, "stiffness": 150.0})
+def filmed(
+    env: Any, policy: Any, observation: Any, moments: dict[str, float]
+) -> dict[str, Any]:
+    """A picture of each phase of a policy, so long after it began, to the end of an episode [s]."""
     panels: dict[str, Any] = {}
     ended = False
     while not ended:
         action = policy.act(observation)
-        if policy.phase not in panels and policy.since >= MOMENTS.get(policy.phase, math.inf):
+        if policy.phase not in panels and policy.since >= moments.get(policy.phase, math.inf):
             panels[policy.phase] = env.render()
         observation, _, terminated, truncated, _ = env.step(action)
         ended = terminated or truncated
+    return panels
+
+
+def picture(path: Path) -> None:
+    """Open, closed, holding, and letting go."""
+    env, policy = Grasp(render_mode="rgb_array", size=(400, 440)), GraspPolicy()
+    observation, _ = env.reset(seed=3, options={"width": 7e-3, "stiffness": 150.0})
+    panels = filmed(env, policy, observation, MOMENTS)
     env.close()
     imageio.imwrite(path, np.concatenate(list(panels.values()), axis=1))
 
