@@ -29,7 +29,7 @@ OBSERVATION = Table(
         Entry("TCA length", 1, 0.0, 1.0, "m", centre=0.22, scale=0.01),
         Entry("TCA resistance", 1, 0.0, 40.0, "ohm", centre=15.7, scale=0.3),
         Entry("TCA tension", 1, 0.0, 5.0, "N", centre=0.2, scale=0.2),
-        Entry("angle", 1, -7.0, 7.0, "rad", centre=1.6, scale=1.6),
+        Entry("angle", 1, -10.0, 10.0, "rad", centre=1.6, scale=1.6),
         Entry("angular velocity", 1, -200.0, 200.0, "rad/s", scale=1.0),
         Entry("commanded angle", 1, 0.0, 4.0, "rad", centre=1.6, scale=1.6),
         Entry("time at the goal", 1, 0.0, 3.0, "s"),
@@ -47,6 +47,7 @@ _CLAMP = (-0.03, 0.0, 0.162)  # where the module hangs [m]
 # z of the module down, its TCA towards x of the world, wxyz.
 _HANGING = (0.0, math.sqrt(0.5), -math.sqrt(0.5), 0.0)
 _COLD, _HOT = np.array([0.86, 0.74, 0.48]), np.array([0.90, 0.25, 0.12])  # of the spine
+_ROLLED = 2.0 * math.pi  # angle at which the ends meet and the chain would pass itself [rad]
 _EXACT = math.radians(1.0)  # error of an angle that does not count [rad]
 _APART = math.radians(20.0)  # least distance of a drawn start from the goal [rad]
 
@@ -85,7 +86,8 @@ class MorphModule(SimulatedTask):
     Reset: cold and fixed in some angle, to be fixed in another one. ``options`` is the table of all
     that can be given.
 
-    Terminates at the goal (success). Truncates after the time limit, and with
+    Terminates at the goal (success), and when the module is rolled up: bent by a full turn, where it
+    would touch itself, which nothing here sees. Truncates after the time limit, and with
     ``info["truncation_reason"]`` if the TCA is damaged, too hot or torn, the spine too hot, or if
     the simulation diverged.
     """
@@ -222,8 +224,9 @@ class MorphModule(SimulatedTask):
         terms["goal"] = 20.0 if success else 0.0
         terms["damage"] = -10.0 if some(self.sim.spines.damaged) else 0.0
         return Verdict(
-            terms=terms, success=success, seen={"time at the goal": min(held, self.hold_time)}
-        )
+            terms=terms, success=success, seen={"time at the goal": min(held, self.hold_time)},
+            ended="rolled up" if abs(self._bent) > _ROLLED and not success else None,
+        )  # fmt: skip
 
     def _fixed(self) -> bool:
         """Whether the angle is the commanded one and the spine rigid."""

@@ -45,6 +45,7 @@ _BUILT = (
     "render_mode", "_camera", "_size", "spec", "metadata",
     "heating", "control_period", "interval", "repeats", "share", "_off", "_half_range",
 )  # fmt: skip
+_DAMAGE = frozenset(("TCA temperature", "TCA tension"))  # rows that are out of bounds by damage
 HEATINGS = ("temperature", "power")  # what a number of an action means to a TCA
 
 
@@ -73,7 +74,7 @@ class SimulatedTask(gym.Env[Observation, Action], ABC):
     The episode is run here, in one order. ``reset`` draws the options, varies the robot and has
     the heir ``prepare`` it. A step is ``drive``, in which the heir says what the action does to
     the simulation, then the simulation, then ``finish``: has the simulation broken
-    off, is something seen out of its bounds, is a TCA damaged (``harm``), what has been earned and
+    off, is something seen out of its bounds, other than by damage, is a TCA damaged (``harm``), what has been earned and
     is the episode over (``judge``). A vector environment calls drive and finish for each of its
     tasks and lets all simulations run between them.
 
@@ -401,15 +402,18 @@ class SimulatedTask(gym.Env[Observation, Action], ABC):
         """
         table, sim = self.observation, self.sim
         reason = broken_off(error)
+        harmed = None if error else self.harm()
         observation = self.seen()
         outside = table.outside(observation)
         if outside:
-            reason = reason or f"diverged: {', '.join(outside)} out of bounds"
+            explained = harmed and _DAMAGE.issuperset(outside) and np.isfinite(observation).all()
+            if not explained:
+                reason = reason or f"diverged: {', '.join(outside)} out of bounds"
             observation = table.bounded(observation)
         terms = dict.fromkeys(self.terms, 0.0)
         success, ended, cost = False, None, 0.0
         if reason is None:  # nothing is known of a diverged state
-            reason = self.harm()
+            reason = harmed
             verdict = self.judge(drive, reason is not None)
             terms |= verdict.terms
             success, ended = verdict.success, verdict.ended

@@ -34,7 +34,7 @@ pytestmark = pytest.mark.skipif(not Path("/proc").is_dir(), reason="looks for pr
 
 REACH, MORPH, WALK = "TCA/BendReach-v0", "TCA/MorphModule-v0", "TCA/TetrapodWalk-v0"
 PATIENCE = 900.0  # only against hanging [s]
-EVALUATED = 12
+EVALUATED = 40
 
 TRAIN = f"""
 import sys
@@ -123,7 +123,7 @@ class Command:
 CLI = ("-m", "tca_mj.cli")
 OUT = ("--task", REACH, "--out", "out")
 COMMANDS = {
-    "eval": Command((*CLI, "eval", "random", *OUT, "--episodes", str(EVALUATED), "--steps", "150",
+    "eval": Command((*CLI, "eval", "random", *OUT, "--episodes", str(EVALUATED), "--steps", "60",
                      "--workers", "2"), episodes, figures),
     "train": Command(("-c", TRAIN), learned, trained),
     "train cma": Command(("search.py",), learned, trained),
@@ -151,11 +151,18 @@ class Killer:
             stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True,
         )  # fmt: skip
 
-    def finish(self) -> float:
-        """Runs it to the end and returns how long that took [s]."""
-        start = time.monotonic()
-        assert self.start().wait(timeout=PATIENCE) in (0, 1)  # a demo that is no success
-        return time.monotonic() - start
+    def finish(self) -> tuple[float, float]:
+        """Runs it to the end and returns how long that took, and how long it was at work [s]."""
+        start, run = time.monotonic(), self.start()
+        self.begun(run)
+        begun = time.monotonic()
+        assert run.wait(timeout=PATIENCE) in (0, 1)  # a demo that is no success
+        return time.monotonic() - start, time.monotonic() - begun
+
+    def begun(self, run: subprocess.Popen[bytes]) -> None:
+        """Waits until a run has the folder or is over."""
+        while run.poll() is None and not self.holds(run.pid):
+            time.sleep(0.01)
 
     def holds(self, process: int) -> bool:
         """Whether a process, which may just have ended, has or had the folder last."""
@@ -198,6 +205,8 @@ class Killer:
 def kill(name: str, times: int, folder: Path, seed: int) -> Counter[str]:
     """Kills a command, begins it again until it was killed often enough, and lets it end.
 
+    Every other moment, by chance, is drawn from the time that it is at work, the others from all.
+
     Returns:
         Numbers of kills, of those that came while it had the folder and of those that found
         something finished there, of times that it had come to its end in between, and the longest
@@ -205,13 +214,16 @@ def kill(name: str, times: int, folder: Path, seed: int) -> Counter[str]:
     """
     command, drawn = COMMANDS[name], random.Random(seed)
     whole = Killer(command, folder / "whole")
-    duration = whole.finish()
+    duration, working = whole.finish()
     expected = command.result(whole.out)
     killer, found = Killer(command, folder / "killed"), Counter[str]()
     while found["kills"] < times:
-        run = killer.start()
+        run, within = killer.start(), duration
+        if drawn.random() < 0.5:  # most of what a short command does is to start
+            killer.begun(run)
+            within = working
         try:
-            run.wait(timeout=drawn.uniform(0.0, duration))
+            run.wait(timeout=drawn.uniform(0.0, within))
         except subprocess.TimeoutExpired:
             reached = command.so_far(killer.out) if killer.out.exists() else 0  # while it runs
             os.kill(run.pid, signal.SIGKILL)

@@ -215,6 +215,18 @@ def test_too_much_heat_ends_the_episode(shared, part):
     assert info["reward_terms"]["damage"] == 0.0
 
 
+def test_a_module_that_rolls_up_has_not_diverged(shared):
+    shared.reset(seed=0, options={"start": 0.0, "tca_gain": 3.3})
+    for k in range(200):
+        warm = k >= 75
+        action = np.array([KEEP[0] if warm else 1.0, -0.66 if warm else -1.0, -1.0], np.float32)
+        observation, _, terminated, truncated, info = shared.step(action)
+        if terminated or truncated:
+            break
+    assert info["termination_reason"] == "rolled up" and not info["success"]
+    assert info["angle"] > 2.0 * math.pi and observation in shared.observation_space
+
+
 @pytest.mark.parametrize("seed", range(3))
 def test_the_script_reaches_and_fixes_the_angle(shared, seed):
     rewards, infos, policy = episode(shared, seed)

@@ -241,6 +241,17 @@ def test_too_much_heat_ends_the_episode(shared):
     assert terms["end"] == -5.0
 
 
+def test_what_is_torn_has_not_diverged(shared):
+    """Coils that touch pull with 20 N, four times what the observation holds."""
+    shared.reset(seed=0, options={"tca_gain": 4.2, "heat_loss": 0.06})
+    for _ in range(40):
+        observation, *_, truncated, info = shared.step(FULL)
+        if truncated:
+            break
+    assert info["truncation_reason"].startswith("torn: ") and info["tension"].max() > 5.0
+    assert observation in shared.observation_space and info["cost"] >= 1.0
+
+
 def test_options_do_not_shift_the_other_draws(shared):
     _, free = shared.reset(seed=11, options={"randomise": 0.2})
     _, told = shared.reset(seed=11, options={"randomise": 0.2, "mass": 1.0})
