@@ -86,8 +86,8 @@ class MorphModule(SimulatedTask):
     Reset: cold and fixed in some angle, to be fixed in another one. ``options`` is the table of all
     that can be given.
 
-    Terminates at the goal (success), and when the module is rolled up: bent by a full turn, where it
-    would touch itself, which nothing here sees. Truncates after the time limit, and with
+    Terminates at the goal (success), and when the module is rolled up: bent by a full turn, where
+    it would touch itself, which nothing here sees. Truncates after the time limit, and with
     ``info["truncation_reason"]`` if the TCA is damaged, too hot or torn, the spine too hot, or if
     the simulation diverged.
     """

@@ -73,9 +73,9 @@ class SimulatedTask(gym.Env[Observation, Action], ABC):
 
     The episode is run here, in one order. ``reset`` draws the options, varies the robot and has
     the heir ``prepare`` it. A step is ``drive``, in which the heir says what the action does to
-    the simulation, then the simulation, then ``finish``: has the simulation broken
-    off, is something seen out of its bounds, other than by damage, is a TCA damaged (``harm``), what has been earned and
-    is the episode over (``judge``). A vector environment calls drive and finish for each of its
+    the simulation, then the simulation, then ``finish``: has the simulation broken off, is
+    something seen out of its bounds, other than by damage, is a TCA damaged (``harm``), what has
+    been earned and is the episode over (``judge``). A vector environment calls drive and finish for each of its
     tasks and lets all simulations run between them.
 
     A task has an ``__init__`` of its own, or says in its class what it is made of: ``scene``,
