@@ -75,8 +75,8 @@ class SimulatedTask(gym.Env[Observation, Action], ABC):
     the heir ``prepare`` it. A step is ``drive``, in which the heir says what the action does to
     the simulation, then the simulation, then ``finish``: has the simulation broken off, is
     something seen out of its bounds, other than by damage, is a TCA damaged (``harm``), what has
-    been earned and is the episode over (``judge``). A vector environment calls drive and finish for each of its
-    tasks and lets all simulations run between them.
+    been earned and is the episode over (``judge``). A vector environment calls drive and finish
+    for each of its tasks and lets all simulations run between them.
 
     A task has an ``__init__`` of its own, or says in its class what it is made of: ``scene``,
     ``rows`` and ``option_rows``; then its action heats all TCAs.
