@@ -19,6 +19,7 @@ from tca_mj.checks import door, some
 from tca_mj.envs.objects import named, stand, touching
 from tca_mj.envs.options import Option, Options, Setup, Uniform, variation_options
 from tca_mj.envs.outcome import TaskState, Verdict
+from tca_mj.envs.recipe import Recipe
 from tca_mj.envs.rewards import tolerance
 from tca_mj.envs.table import Entry, Table
 from tca_mj.envs.task import SimulatedTask, TaskArguments, parts
@@ -170,6 +171,7 @@ class AdaptiveGrasp(SimulatedTask):
     scripted = "tca_mj.agents.scripts.adaptive:scripted"
     scripted_arguments = {"action": "power"}
     robot_argument = ("gripper_spec", AdaptiveGripperSpec)
+    recipes = {"sac": Recipe.held(8000, 0.5, mirrored=True)}
     film_speed = 4.0
 
     @door

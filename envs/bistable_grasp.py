@@ -14,6 +14,7 @@ from tca_mj.checks import door
 from tca_mj.envs.holding import HeldObject, held_rows, holding_options
 from tca_mj.envs.objects import stand
 from tca_mj.envs.options import Option, Options, Setup, Uniform, variation_options
+from tca_mj.envs.recipe import Recipe
 from tca_mj.envs.rewards import tolerance
 from tca_mj.envs.table import Entry, Table
 from tca_mj.envs.task import TaskArguments, parts
@@ -113,6 +114,7 @@ class BistableGrasp(HeldObject):
     camera_prefix = "goal."
     scripted = "tca_mj.agents.scripts.bistable_grasp:scripted"
     robot_argument = ("gripper_spec", BistableGripperSpec)
+    recipes = {"sac": Recipe.held(8000, 0.4, mirrored=True)}
     film_speed = 2.0
 
     @door

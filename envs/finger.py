@@ -13,6 +13,7 @@ from tca_mj.checks import door
 from tca_mj.envs.hanging import CLAMP, hang
 from tca_mj.envs.options import Constant, Option, Options, Setup, Uniform, variation_options
 from tca_mj.envs.outcome import Verdict
+from tca_mj.envs.recipe import Recipe
 from tca_mj.envs.table import Entry, Table
 from tca_mj.envs.task import SimulatedTask, TaskArguments
 from tca_mj.envs.vector import TaskVector
@@ -136,6 +137,7 @@ class FingerSense(SimulatedTask):
     scripted = "tca_mj.agents.scripts.finger:scripted"
     scripted_arguments = {"action": "power"}
     robot_argument = ("finger_spec", InnervatedFingerSpec)
+    recipes = {"sac": Recipe.held(8000, 0.2)}
 
     @door
     def __init__(

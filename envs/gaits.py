@@ -81,21 +81,14 @@ TASKS = {
                        turning=0.0, ways=(0.0, math.pi)),
 }
 
-# The best of what was tried: docs/gaits.md.
-_LEARNER = {
-    "learning_rate": 1e-3, "last_rate": 0.1, "batch_size": 256, "tau": 0.01,
-    "ent_coef": "auto_0.05", "learning_starts": 1200, "gradient_steps": 8, "hidden": (128, 128),
-    "buffer_size": 50_000,
-}  # fmt: skip
 # After how many decisions it was learned, and whose steps come first: the script's crawl moves all
 # legs together, and so would the learner.
 _LEARNED = {"crawl": (6000, "trot"), "walk": (15_000, "scripted"), "shimmy": (16_000, "scripted")}
 RECIPES = {
     gait: {
-        "sac": Recipe(
-            steps=steps, control_period=0.4, timestep=10e-3, options={"randomise": 0.2},
-            scaled=True, mirrored=True, growth={"wander": 10_000}, discount=0.94, interval=1000,
-            start=first, learner=_LEARNER,
+        "sac": Recipe.held(
+            steps, 0.4, timestep=10e-3, options={"randomise": 0.2}, mirrored=True,
+            growth={"wander": 10_000}, start=first,
         ),
     }
     for gait, (steps, first) in _LEARNED.items()

@@ -15,6 +15,7 @@ from tca_mj.checks import door
 from tca_mj.envs.holding import HeldObject, held_rows, holding_options
 from tca_mj.envs.objects import stand
 from tca_mj.envs.options import Option, Options, Setup, Uniform, variation_options
+from tca_mj.envs.recipe import Recipe
 from tca_mj.envs.table import Entry, Table
 from tca_mj.envs.task import TaskArguments, parts
 from tca_mj.envs.vector import TaskVector
@@ -108,6 +109,7 @@ class Grasp(HeldObject):
     camera_prefix = "tray."
     scripted = "tca_mj.agents.scripts.grasp:scripted"
     robot_argument = ("gripper_spec", GripperSpec)
+    recipes = {"sac": Recipe.held(8000, 0.5, mirrored=True)}
     film_speed = 2.0
 
     @door

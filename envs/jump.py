@@ -14,6 +14,7 @@ from tca_mj.assets import mjcf
 from tca_mj.checks import door
 from tca_mj.envs.options import Option, Options, Setup, variation_options
 from tca_mj.envs.outcome import Verdict
+from tca_mj.envs.recipe import Recipe
 from tca_mj.envs.table import Entry, Table
 from tca_mj.envs.task import SimulatedTask, TaskArguments
 from tca_mj.envs.vector import TaskVector
@@ -90,6 +91,7 @@ class Jump(SimulatedTask):
     energy_price, end_price = 0.1, 5.0
     scripted = "tca_mj.agents.scripts.jump:scripted"
     robot_argument = ("jumper_spec", JumperSpec)
+    recipes = {"sac": Recipe.held(8000, 0.1)}
     film_speed = 0.1
 
     @door

@@ -7,11 +7,18 @@ from dataclasses import dataclass, field
 from functools import partial
 from typing import Annotated, Any
 
-from tca_mj.checks import Checked, Positive, number, whole
+from tca_mj.checks import Checked, Positive, door, number, whole
 from tca_mj.registry import ControlPeriod
 
 _Steps = Annotated[int, partial(whole, at_least=1, at_most=1_000_000_000)]
 _Discount = Annotated[float, partial(number, above=0.0, at_most=1.0)]
+
+# The best of what was tried on gaits: docs/gaits.md.
+_HELD = {
+    "learning_rate": 1e-3, "last_rate": 0.1, "batch_size": 256, "tau": 0.01,
+    "ent_coef": "auto_0.05", "learning_starts": 1200, "gradient_steps": 8, "hidden": (128, 128),
+    "buffer_size": 50_000,
+}  # fmt: skip
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -54,3 +61,21 @@ class Recipe(Checked):
     start: str = "random"
     learner: Mapping[str, Any] = field(default_factory=dict)
     interval: _Steps | None = None
+
+    @classmethod
+    @door
+    def held(cls, steps: int, control_period: float, **more: Any) -> Recipe:
+        """SAC that tells temperatures and lets them be reached: what the gaits are learned by.
+
+        Args:
+            steps: Steps of all environments together.
+            control_period: For which an action is held [s].
+            **more: What else the recipe says.
+
+        Raises:
+            ValueError: If a field is out of bounds.
+        """
+        return cls(
+            steps=steps, control_period=control_period, scaled=True, discount=0.94, interval=1000,
+            learner=_HELD, **more,
+        )  # fmt: skip
