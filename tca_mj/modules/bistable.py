@@ -61,8 +61,8 @@ class BistableSpec(Checked):
         window: Share of the spine's width that the hole for the band leaves. Estimate: with these
             two a TCA of 172 °C pulls a module of 50° into both states, as it did, with an eighth
             to spare; beyond 0.5 it could no more.
-        fill: Share of the bodies that is silicone and no slot, channel or hole. From the 4.2 g of
-            a gripper of two (Sun, Section 4.3.4); a full one would weigh 7.7 g.
+        fill: Share of the bodies that is silicone and no slot, channel or hole. Estimate: a
+            gripper of two weighs 4.0 g with it, 4.2 g are printed (Sun, Section 4.3.4).
         bodies: 2, or 1 if the body on the side of -x is left out, as in the jumper.
         angle: Angle θ0 of the unloaded spine [rad]. Sun, Section 4.3.4: 50° in the gripper.
         band_length: Length of the slack band [m]. Sun, Section 4.3.2.
