@@ -30,3 +30,17 @@ def no_litter(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
     os.environ["TMPDIR"] = tempfile.tempdir = usual
     left = [path for folder in (temporary, working) for path in folder.iterdir()]
     assert [path for path in left if "torchinductor" not in path.name] == []
+
+
+@pytest.fixture
+def without_board(monkeypatch: pytest.MonkeyPatch) -> None:
+    """No TensorBoard, which takes longer than the rest of a small run."""
+    from tca_mj.agents.train.runs import RunFolder
+
+    class Board:
+        def add_scalar(self, *_: object) -> None:
+            pass
+
+        flush = close = lambda self: None
+
+    monkeypatch.setattr(RunFolder, "tensorboard", lambda self, step: Board())

@@ -12,7 +12,6 @@ from gymnasium.vector import AsyncVectorEnv
 
 from tca_mj.envs.arm import ACTION, OBJECTS, OBSERVATION, ArmPickPlace
 from tca_mj.envs.table import Entry, Table
-from tca_mj.record.render import RenderingUnavailable
 
 ID = "TCA/ArmPickPlace-v0"
 OFF = np.array([-1.0] * 5 + [0.0], dtype=np.float32)
@@ -271,19 +270,6 @@ def test_an_object_on_its_stand_is_no_success(shared):
         _, reward, terminated, truncated, info = shared.step(OFF)
         assert not (terminated or truncated or info["success"])
         assert info["reward_terms"]["place"] == 0.0
-
-
-def test_it_draws_itself():
-    env = gym.make(ID, render_mode="rgb_array", size=(64, 48))
-    env.reset(seed=0)
-    try:
-        picture = env.render()
-    except RenderingUnavailable as reason:
-        pytest.skip(str(reason))
-    finally:
-        env.close()
-    assert picture.shape == (48, 64, 3) and picture.dtype == np.uint8
-    assert picture.std() > 5.0
 
 
 TABLE = Table(

@@ -1,8 +1,6 @@
 """``TCA/BistableGrasp-v0``: what the gripper carries, and that the script carries it unpowered."""
 
-from pathlib import Path
 
-import numpy as np
 import pytest
 
 from tca_mj.agents.scripts.bistable_grasp import BistableGraspPolicy
@@ -128,9 +126,3 @@ def test_the_action_moves_the_carriage(shared):
 def test_what_cannot_be_is_refused(make, said):
     with pytest.raises(ValueError, match=said):
         make()
-
-
-def test_the_page_has_the_observation_table():
-    page = Path(__file__).resolve().parent.parent / "docs" / "bistable-gripper.md"
-    assert OBSERVATION.markdown() in page.read_text(encoding="utf-8")
-    assert np.isfinite(OBSERVATION.space.high).all()

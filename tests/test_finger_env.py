@@ -246,8 +246,3 @@ def test_the_page_of_validation_says_what_is_found():
     text, rows = page.read_text(encoding="utf-8"), touched_findings()
     assert [row.fact for row in rows if f"| {row.model} | {row.verdict} |" not in text] == []
     assert {row.verdict for row in rows} == {"held", "trend held", "fitted"}
-
-
-def test_the_page_has_the_observation_table():
-    page = Path(__file__).resolve().parent.parent / "docs" / "finger.md"
-    assert OBSERVATION.markdown() in page.read_text(encoding="utf-8")

@@ -1,7 +1,6 @@
 """``TCA/Jump-v0``: that it jumps, what its height depends on, and where the energy goes."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import mujoco
 import numpy as np
@@ -147,8 +146,3 @@ def test_a_state_before_the_snap_leads_to_the_same_jump(shared):
 def test_bad_arguments_are_refused(given, message):
     with pytest.raises(ValueError, match=message):
         Jump(**given)
-
-
-def test_the_page_has_the_observation_table():
-    page = Path(__file__).resolve().parent.parent / "docs" / "jump.md"
-    assert OBSERVATION.markdown() in page.read_text(encoding="utf-8")

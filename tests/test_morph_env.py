@@ -4,7 +4,6 @@ import hashlib
 import math
 from copy import copy
 from dataclasses import replace
-from pathlib import Path
 
 import gymnasium as gym
 import mujoco
@@ -14,7 +13,6 @@ import pytest
 from tca_mj.agents.scripts.morph import MorphPolicy
 from tca_mj.control.morph import Phase
 from tca_mj.envs.morph import ACTION, OBSERVATION, MorphModule
-from tca_mj.record.render import RenderingUnavailable
 from tca_mj.smp import lumped
 
 ID = "TCA/MorphModule-v0"
@@ -313,21 +311,3 @@ def test_staying_where_it_is_good_earns_nothing(shared):
     for name, total in earned.items():
         assert total == pytest.approx(shared._progress[name] - start[name], abs=1e-12)
     assert earned["fix"] < -0.5  # softened: the shape is lost
-
-
-def test_it_draws_itself():
-    env = gym.make(ID, render_mode="rgb_array", size=(64, 48))
-    env.reset(seed=0)
-    try:
-        picture = env.render()
-    except RenderingUnavailable as reason:
-        pytest.skip(str(reason))
-    finally:
-        env.close()
-    assert picture.shape == (48, 64, 3) and picture.dtype == np.uint8
-    assert picture.std() > 5.0
-
-
-def test_the_page_has_the_observation_table():
-    page = Path(__file__).resolve().parent.parent / "docs" / "morphing.md"
-    assert OBSERVATION.markdown() in page.read_text(encoding="utf-8")

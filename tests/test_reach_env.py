@@ -3,7 +3,6 @@
 import hashlib
 import math
 from copy import copy
-from pathlib import Path
 
 import gymnasium as gym
 import mujoco
@@ -328,8 +327,3 @@ def test_the_target_is_drawn_where_it_is():
     finally:
         env.close()
     assert picture.shape == (48, 64, 3) and picture.std() > 5.0
-
-
-def test_the_page_has_the_observation_table():
-    page = Path(__file__).resolve().parent.parent / "docs" / "reach.md"
-    assert OBSERVATION.markdown() in page.read_text(encoding="utf-8")

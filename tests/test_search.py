@@ -19,7 +19,6 @@ from tca_mj.agents.scripts.tetrapod import GAITS, STEERING, WALK
 from tca_mj.agents.train import search as searching
 from tca_mj.agents.train.gait_score import Headway, Reference, Trial, run_trial, score
 from tca_mj.agents.train.gait_space import PERIOD, GaitSpace
-from tca_mj.agents.train.runs import RunFolder
 from tca_mj.agents.train.search import TROT, SearchConfig, search
 from tca_mj.agents.workers import Workers
 from tca_mj.cli import main
@@ -166,18 +165,7 @@ def built_once(monkeypatch):
     monkeypatch.setattr(searching, "first_gait", FIRST)
 
 
-@pytest.fixture
-def quiet(monkeypatch):
-    class Board:
-        def add_scalar(self, *_):
-            pass
-
-        flush = close = lambda self: None
-
-    monkeypatch.setattr(RunFolder, "tensorboard", lambda self, step: Board())
-
-
-@pytest.mark.usefixtures("quiet")
+@pytest.mark.usefixtures("without_board")
 def test_a_search_that_is_stopped_anywhere_goes_on_with_nothing_lost(monkeypatch, tmp_path):
     whole = Model()
     monkeypatch.setattr(searching, "Workers", whole)
@@ -220,7 +208,7 @@ def test_tensorboard_has_every_point_once(monkeypatch, tmp_path):
         assert [value for _, value in points] == pytest.approx([float(r[name]) for r in some])
 
 
-@pytest.mark.usefixtures("quiet")
+@pytest.mark.usefixtures("without_board")
 def test_a_search_finds_what_is_better(monkeypatch, tmp_path):
     monkeypatch.setattr(searching, "Workers", Model())
     config = replace(TINY, steps=60_000, sigma=0.1)
@@ -248,7 +236,7 @@ search(SearchConfig(**eval(sys.argv[1])), Path(sys.argv[2]), workers=2)
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="needs signals")
-@pytest.mark.usefixtures("quiet")
+@pytest.mark.usefixtures("without_board")
 def test_a_killed_search_goes_on_to_the_same_curve(tmp_path):
     """By kill -9, with two processes that end with it; the other run has one and no break."""
     origin = Origin(algorithm="by hand", seed=0, steps=0)

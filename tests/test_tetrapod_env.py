@@ -11,10 +11,8 @@ import pytest
 from tca_mj.agents.scripts.tetrapod import GAITS, gait_policy
 from tca_mj.envs.gaits import ACTION, OBSERVATION, TASKS
 from tca_mj.envs.options import variation_of
-from tca_mj.envs.stance import CAMERAS
 from tca_mj.envs.tetrapod import TetrapodGait
 from tca_mj.envs.wrappers import RecordRerun
-from tca_mj.record.render import RenderingUnavailable
 from tca_mj.robots.tetrapod import LEGS
 from tca_mj.variation import Variation
 
@@ -350,19 +348,6 @@ def test_a_fall_ends_the_episode(envs):
     env.data.qpos[1] += 0.3
     *_, terminated, _, info = env.step(OFF)
     assert terminated and info["termination_reason"] == "fell off the beam"
-
-
-def test_it_draws_itself():
-    env = gym.make(IDS["walk"], render_mode="rgb_array", size=(64, 48), camera=CAMERAS[1])
-    env.reset(seed=0)
-    try:
-        picture = env.render()
-    except RenderingUnavailable as reason:
-        pytest.skip(str(reason))
-    finally:
-        env.close()
-    assert picture.shape == (48, 64, 3) and picture.dtype == np.uint8
-    assert picture.std() > 5.0
 
 
 @pytest.mark.parametrize("gait", TASKS)

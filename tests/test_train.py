@@ -59,24 +59,13 @@ def written(folder):
 
 
 @pytest.fixture
-def quiet(monkeypatch):
+def quiet(without_board, monkeypatch):
     """No TensorBoard and no recordings, which take longer than the rest."""
-
-    class Board:
-        def add_scalar(self, *_):
-            pass
-
-        flush = close = lambda self: None
-
-    monkeypatch.setattr(RunFolder, "tensorboard", lambda self, step: Board())
     monkeypatch.setattr("tca_mj.agents.train.deep.record", lambda *_, **__: None)
 
 
-@pytest.mark.usefixtures("quiet")
-@pytest.mark.parametrize("algorithm", LEARNERS)
-def test_a_run_that_is_broken_off_ends_as_one_that_is_not(algorithm, tmp_path, monkeypatch):
-    config = tiny(algorithm)
-    expected = train(config, tmp_path / "whole", progress=False)
+def broken_off_after(steps, monkeypatch):
+    """For each number of steps, learning ends in an interruption after so many."""
     step, left = LearningEnv.step_wait, 0
 
     def breaking(self):
@@ -87,7 +76,16 @@ def test_a_run_that_is_broken_off_ends_as_one_that_is_not(algorithm, tmp_path, m
         return step(self)
 
     monkeypatch.setattr(LearningEnv, "step_wait", breaking)
-    for left in (27, 17, 200):  # amid intervals, off the edges of episodes  # noqa: B007
+    for left in steps:  # noqa: B007
+        yield
+
+
+@pytest.mark.usefixtures("quiet")
+@pytest.mark.parametrize("algorithm", LEARNERS)
+def test_a_run_that_is_broken_off_ends_as_one_that_is_not(algorithm, tmp_path, monkeypatch):
+    config = tiny(algorithm)
+    expected = train(config, tmp_path / "whole", progress=False)
+    for _ in broken_off_after((27, 17, 200), monkeypatch):  # amid intervals and episodes
         try:
             found = train(config, tmp_path / "parts", progress=False)
         except KeyboardInterrupt:
@@ -138,17 +136,7 @@ def test_a_gait_makes_the_first_steps(tmp_path):
 def test_a_run_from_a_gait_goes_on_as_one_that_is_not_broken_off(tmp_path, monkeypatch):
     config = walking()
     train(config, tmp_path / "whole", progress=False)
-    step, left = LearningEnv.step_wait, 0
-
-    def breaking(self):
-        nonlocal left
-        left -= 1
-        if left < 0:
-            raise KeyboardInterrupt
-        return step(self)
-
-    monkeypatch.setattr(LearningEnv, "step_wait", breaking)
-    for left in (7, 33, 200):  # amid the gait's steps, amid the learner's  # noqa: B007
+    for _ in broken_off_after((7, 33, 200), monkeypatch):  # amid the gait's steps, the learner's
         with suppress(KeyboardInterrupt):
             train(config, tmp_path / "parts", progress=False)
     assert written(tmp_path / "parts") == written(tmp_path / "whole")
