@@ -55,6 +55,9 @@ from tca_mj.tca import (
 # Physics steps between two updates of the TCAs, and in one call: MuJoCo cannot be interrupted in
 # the former, and takes some ten microseconds for each of a small robot.
 MOST_SUBSTEPS, MOST_STEPS = 10_000, 1_000_000
+# Physics steps after which is looked whether the state has diverged: one that is no number takes
+# the solver all its iterations, of a robot with many contacts half a second for each step.
+_RUN = 5
 # 0.1 s is longer than a soft body swings, a microsecond shorter than any contact.
 Timestep = Annotated[float, partial(number, at_least=1e-6, at_most=0.1, unit="s")]
 # Surroundings in which TCAs and spines are cold, and were tried.
@@ -568,7 +571,10 @@ class Simulation:
                 f"the TCAs have no state at {self.time:.3f} s: {error}"
             ) from error
         self._hand_over(pull)
-        mujoco.mj_step(model, data, substeps)
+        for done in range(0, substeps, _RUN):
+            mujoco.mj_step(model, data, min(_RUN, substeps - done))
+            if data.warning.number.any():
+                self._check()
 
     def checked(self, command: ArrayLike, voltage: ArrayLike, fan: ArrayLike) -> Inputs:
         """Command, shape (n,), voltage and fan, shape (spines.n,) each, for ``step``.
