@@ -109,7 +109,9 @@ def followed() -> list[str]:
     told = {f"{45 * k}°": {"direction": math.remainder(k * math.pi / 4.0, 2.0 * math.pi)}
             for k in range(8)}  # fmt: skip
     told |= {"stand": {"speed": 0.0}, "4.5 mm/s": {"speed": 4.5e-3},
-             "turn left": {"turning": 0.03}, "turn right": {"turning": -0.03}}  # fmt: skip
+             "turn left": {"turning": 0.03}, "turn right": {"turning": -0.03},
+             "0°, pushed by 0.05 m/s every 10 s": {"push": 0.05, "push_every": 10.0},
+             "0°, up a slope of 5°": {"slope": math.radians(5.0)}}  # fmt: skip
     rows, speeds = [], []
     for name, options in told.items():
         evaluation = Evaluation(task=demo.task, policy=WALKER, options=options, **COMMANDED)

@@ -109,7 +109,7 @@ def test_each_term_of_the_score(change, term, value):
 def brief(**change):
     quick = replace(WALK, period=2.0)
     good = {"task": "TCA/TetrapodWalk-v0", "gait": quick, "steering": (600.0,) * 4, "seed": 2,
-            "randomise": 0.2, "settling": 2.0, "window": 2.0}  # fmt: skip
+            "options": {"randomise": 0.2}, "settling": 2.0, "window": 2.0}  # fmt: skip
     return Trial(**good | change)
 
 
@@ -273,7 +273,7 @@ def test_a_killed_search_goes_on_to_the_same_curve(tmp_path):
 def test_an_error_in_a_process_arrives_and_so_does_its_end():
     with Workers(2) as workers:
         with pytest.raises(ValueError, match="randomise must be"):
-            list(workers.run(run_trial, [(brief(randomise=0.9),)]))
+            list(workers.run(run_trial, [(brief(options={"randomise": 0.9}),)]))
         for process in workers._processes:
             process.kill()
         with pytest.raises(ChildProcessError, match="a process that ran episodes has ended"):
@@ -287,7 +287,7 @@ def test_an_error_in_a_process_arrives_and_so_does_its_end():
         ({"steps": 0}, "steps must be"),
         ({"population": 4}, "population must be at least 5"),
         ({"sigma": 0.0}, "sigma must be finite and above 0"),
-        ({"randomise": 0.6}, "randomise must be finite and at least 0 and at most 0.5"),
+        ({"options": 0.2}, "options must be"),
         ({"window": 26.0}, "window must be finite and at least 0.1 and at most 25 s"),
     ],
 )

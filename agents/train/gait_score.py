@@ -1,7 +1,7 @@
 """How good a gait is: headway over whole cycles, and the score by which a search ranks gaits."""
 
 import functools
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import astuple, dataclass
 from itertools import islice
 from typing import Any
@@ -34,7 +34,7 @@ class Trial:
         gait: The gait.
         steering: As in ``GaitPolicy``, per leg [K/rad].
         seed: Seed of the episode.
-        randomise: Spread of the variation, as the option ``randomise`` of the task.
+        options: Options of the episode, whose way is straight ahead.
         settling: Time that is not judged, in which the TCAs become warm; rounded to whole cycles
             [s].
         window: Time that is judged, rounded to whole cycles, at least one [s].
@@ -44,7 +44,7 @@ class Trial:
     gait: Gait
     steering: tuple[float, ...]
     seed: int
-    randomise: float
+    options: Mapping[str, float]
     settling: float
     window: float
 
@@ -80,7 +80,7 @@ def run_trial(trial: Trial) -> Headway:
     cycle = trial.gait.period / period
     first = round(round(trial.settling / trial.gait.period) * cycle)
     steps = first + round(max(1, round(trial.window / trial.gait.period)) * cycle)
-    options = {"randomise": trial.randomise, "direction": 0.0}
+    options = {**trial.options, "direction": 0.0}
     episode = rollout(env, policy, seed=trial.seed, options=options)
     infos = [step.info for step in islice(episode, steps + 1)]
     done = len(infos) - 1

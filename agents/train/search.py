@@ -8,7 +8,7 @@ on whether the run was interrupted: all draws of a generation come from the seed
 from __future__ import annotations
 
 import pickle
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -53,7 +53,7 @@ class SearchConfig(Checked):
             gaits about the scripted walk is better than it, with 0.1 none.
         population: Gaits per generation, 5 to 10 000.
         episodes: Episodes per gait, the same for all of a generation, up to 10 000.
-        randomise: Spread of the robots in them, a share [1].
+        options: Options of every episode; a robot of its own has ``randomise`` 0 and its numbers.
         settling: Time of each episode that is not judged, as in ``Trial`` [s].
         window: Time that is judged [s].
         validate_every: Generations after which the middle of the search is judged, by the same
@@ -71,7 +71,7 @@ class SearchConfig(Checked):
     sigma: Annotated[float, partial(number, above=0.0, at_most=0.5)] = 0.03
     population: Annotated[int, partial(whole, at_least=5, at_most=10_000)] = 14
     episodes: Few = 1
-    randomise: Annotated[float, partial(number, at_least=0.0, at_most=0.5)] = 0.2
+    options: Mapping[str, float] = field(default_factory=lambda: {"randomise": 0.2})
     settling: Annotated[float, partial(number, at_least=0.0, at_most=20.0, unit="s")] = 10.0
     window: Annotated[float, partial(number, at_least=0.1, at_most=25.0, unit="s")] = 20.0
     validate_every: Many = 8
@@ -263,7 +263,7 @@ class _Search:
         jobs = [
             Trial(
                 task=config.task, gait=gait, steering=steering, seed=seed,
-                randomise=config.randomise, settling=config.settling, window=config.window,
+                options=config.options, settling=config.settling, window=config.window,
             )
             for gait, steering in gaits
             for seed in seeds

@@ -3,6 +3,7 @@
 import argparse
 import shlex
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -158,8 +159,8 @@ def _train(arguments: argparse.Namespace) -> int:
     command, cma = _command(arguments), algorithm == "cma"
     how = ("action", "control_period")
     asked = {name: getattr(arguments, name) for name in how if getattr(arguments, name) is not None}
-    if cma and (asked or arguments.options):
-        raise ValueError("--action, --control-period and --option are not for --algo cma")
+    if cma and asked:
+        raise ValueError("--action and --control-period are not for --algo cma")
     for seed in several or [arguments.seed]:
         out = base / f"seed_{seed}" if several else base
         arguments.kept[:] = [f"the same command goes on with {out}"]
@@ -169,6 +170,7 @@ def _train(arguments: argparse.Namespace) -> int:
                 given[option] = getattr(arguments, option)
         if cma:
             config = searching.SearchConfig(task=arguments.task, **given)
+            config = replace(config, options=config.options | dict(arguments.options))
             searching.search(config, out, workers=arguments.workers, command=command)
         else:
             given |= {"arguments": asked, "options": dict(arguments.options)}
