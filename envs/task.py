@@ -550,7 +550,9 @@ class SimulatedTask(gym.Env[Observation, Action], ABC):
             return None
         if self._screen is None:
             width, height = self._size
-            self._screen = Offscreen(self.model, width=width, height=height, camera=self._camera)
+            self._screen = Offscreen(
+                self.model, width=width, height=height, camera=self._camera, coils=self.sim.tendon
+            )
         self.paint()
         return self._screen.draw(self.data)
 

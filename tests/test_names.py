@@ -51,7 +51,8 @@ INTERNAL = {
         "morphing": "add_end dress",
     },
     "tca_mj.record": {
-        "layout": "*", "plots": "event_rows save_figure", "render": "Closing", "shapes": "*",
+        "coils": "*", "layout": "*", "plots": "event_rows save_figure", "render": "Closing",
+        "shapes": "*",
     },
     "tca_mj.certify": {"": "*"},
     "tca_mj.validation": {"": "*"},

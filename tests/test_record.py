@@ -16,8 +16,9 @@ import rerun
 from rerun.chunk import RrdReader
 
 from tca_mj.modules.bending import bending_module
-from tca_mj.record import QUANTITIES, Recorder, plots, render
+from tca_mj.record import QUANTITIES, Recorder, coils, plots, render
 from tca_mj.record import film as film_module
+from tca_mj.record.coils import _helix
 from tca_mj.record.shapes import body_paths
 from tca_mj.robots.tetrapod import tetrapod
 from tca_mj.sim import Simulation
@@ -481,6 +482,38 @@ def test_a_picture_shows_the_temperature(simulation: Chain) -> None:
     changed = (cold != hot).any(axis=2)
     assert 20 < changed.sum() < 0.1 * changed.size
     assert (hot[changed].astype(int) - cold[changed])[:, 0].mean() > 20.0  # redder
+
+
+def test_a_coil_runs_round_its_path() -> None:
+    """A half circle of 40 mm: at its radius all along, with all its turns."""
+    turn = np.linspace(0.0, np.pi, 400)
+    path = 0.04 * np.array([np.cos(turn), 0.0 * turn, np.sin(turn)]).T
+    coil, out = _helix(np.repeat(path, 2, axis=0), turns=30, radius=5e-4)  # sites may coincide
+    off = np.hypot(np.hypot(coil[:, 0], coil[:, 2]) - 0.04, coil[:, 1])
+    np.testing.assert_allclose(off, 5e-4, rtol=0.02)
+    np.testing.assert_allclose(np.linalg.norm(out, axis=1), 1.0)
+    across = coil[:, 1] > 0.0
+    assert np.sum(across[1:] != across[:-1]) == pytest.approx(60, abs=1)
+
+
+@pytest.mark.usefixtures("opengl")
+def test_a_picture_has_coils_and_a_caption(simulation: Chain) -> None:
+    simulation.reset()
+    camera = mujoco.MjvCamera()
+    camera.lookat[:] = [0.0, 0.0, 0.12]
+    camera.distance, camera.azimuth, camera.elevation = 0.25, 90.0, -10.0
+    with render.Offscreen(
+        simulation.model, width=320, height=240, camera=camera, coils=simulation.tendon
+    ) as view:
+        plain = view.draw(simulation.data)
+        told = view.draw(simulation.data, "1.0 s")
+        drawn = view._scene.ngeom
+    changed = (plain != told).any(axis=2)
+    assert changed[200:].any() and not changed[:180].any()  # at the lower edge alone
+    length = simulation.model.tendon_length0 / simulation.model.tendon_width / coils._PITCH
+    assert drawn > coils._SIDES * np.round(length).sum()
+    with pytest.raises(ValueError, match="coils must be ids below"):
+        render.Offscreen(simulation.model, coils=[99])
 
 
 @pytest.mark.usefixtures("opengl")

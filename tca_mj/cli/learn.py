@@ -170,7 +170,7 @@ def _train(arguments: argparse.Namespace) -> int:
                 given[option] = getattr(arguments, option)
         if cma:
             config = searching.SearchConfig(task=arguments.task, **given)
-            config = replace(config, options=config.options | dict(arguments.options))
+            config = replace(config, options={**config.options, **dict(arguments.options)})
             searching.search(config, out, workers=arguments.workers, command=command)
         else:
             given |= {"arguments": asked, "options": dict(arguments.options)}

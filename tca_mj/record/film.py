@@ -25,6 +25,9 @@ FilmSpeed = Annotated[float, partial(number, at_least=1e-3, at_most=3600.0)]
 class Film(Closing):
     """A simulation filmed at a steady rate, whatever its control period; a context manager.
 
+    TCAs are drawn as coils in the colours of their temperatures, of which there is a scale; a clock
+    says the time of the simulation, and by how much the film is faster.
+
     The file is an mp4 (H.264, yuv420p). Frames go to the encoder one by one and are not kept. It is
     written by one film at a time; one that has been finished is overwritten by the first frame.
     """
@@ -58,6 +61,10 @@ class Film(Closing):
         self._writer: Any = None
         self._claim: Claim | None = None
         self._fps, self._rate = fps, fps / speed
+        self._pace = ""
+        if speed != 1.0:
+            times, how = max(speed, 1.0 / speed), "fast" if speed > 1.0 else "slow"
+            self._pace = f", {times:.3g} times as {how}"
         self._size = width, height
         self._camera = camera
         self._view: Offscreen | None = None
@@ -86,9 +93,12 @@ class Film(Closing):
         if self._view is None or self._view.model is not model:
             self._close_view()
             width, height = self._size
-            self._view = Offscreen(model, width=width, height=height, camera=self._camera)
+            self._view = Offscreen(
+                model, width=width, height=height, camera=self._camera,
+                coils=self.simulation.tendon,
+            )  # fmt: skip
         colour_tendons(model, self.simulation.tendon, self.simulation.temperature)
-        picture = self._view.draw(self.simulation.data)
+        picture = self._view.draw(self.simulation.data, f"{time:.1f} s{self._pace}")
         if self._writer is None:
             self._claim = Claim(self.path)
             self._writer = self._imageio.get_writer(

@@ -27,7 +27,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from tca_mj.checks import door, floats, instance, shown, whole
 from tca_mj.forks import Held, keep_for_ever
-from tca_mj.record.plots import temperature_colour
+from tca_mj.record.coils import wind
+from tca_mj.record.plots import COLDEST, HOTTEST, temperature_colour
 
 Pixels = Annotated[int, functools.partial(whole, at_least=1, at_most=8192)]
 """Width or height of a picture: twice that of a large screen, in every OpenGL's reach."""
@@ -42,6 +43,7 @@ drawing.free()
 context.free()
 """
 _PROBE_SECONDS = 60.0
+_STOPS, _LARGE = 12, 480  # boxes of the scale; height from which on letters are large [pixels]
 _OFF = ("disable", "disabled", "off", "false", "0")
 _ANY = ("", "enable", "enabled", "on", "true", "1")
 
@@ -164,12 +166,17 @@ def colour_tendons(model: mujoco.MjModel, tendon: ArrayLike, temperature: ArrayL
         ValueError: If there is no such tendon, or there are other than n temperatures.
     """
     instance("model", model, mujoco.MjModel)
-    ids, colours = floats("tendon", tendon, empty=True), temperature_colour(temperature)
-    if ids.ndim != 1 or (ids % 1.0).any() or ((ids < 0) | (ids >= model.ntendon)).any():
-        raise ValueError(f"tendon must be ids below {model.ntendon} in a row, got {shown(tendon)}")
+    ids, colours = _tendons(model, "tendon", tendon), temperature_colour(temperature)
     if colours.shape != (ids.size, 3):
         raise ValueError(f"temperature must be {ids.size} numbers, got {shown(temperature)}")
-    model.tendon_rgba[ids.astype(np.int64), :3] = colours
+    model.tendon_rgba[ids, :3] = colours
+
+
+def _tendons(model: mujoco.MjModel, name: str, tendon: ArrayLike) -> NDArray[np.int64]:
+    ids = floats(name, tendon, empty=True)
+    if ids.ndim != 1 or (ids % 1.0).any() or ((ids < 0) | (ids >= model.ntendon)).any():
+        raise ValueError(f"{name} must be ids below {model.ntendon} in a row, got {shown(tendon)}")
+    return ids.astype(np.int64)
 
 
 class Offscreen(Closing, Held):
@@ -182,7 +189,7 @@ class Offscreen(Closing, Held):
     @door
     def __init__(
         self, model: mujoco.MjModel, *, width: Pixels = 960, height: Pixels = 720,
-        camera: int | str | mujoco.MjvCamera = -1,
+        camera: int | str | mujoco.MjvCamera = -1, coils: ArrayLike = (),
     ) -> None:  # fmt: skip
         """Sets up OpenGL.
 
@@ -192,15 +199,16 @@ class Offscreen(Closing, Held):
             height: Height of the pictures, 1 to 8192 [pixels].
             camera: Id or name of a camera of the model, a camera of one's own, or -1 for the
                 model's overview.
+            coils: Ids of tendons that are drawn as coils.
 
         Raises:
             RenderingUnavailable: If OpenGL cannot be had.
-            ValueError: If the size is out of bounds or the camera does not exist.
+            ValueError: If the size is out of bounds, or the camera or a tendon does not exist.
         """
         Held.__init__(self)
         self._thread = threading.current_thread()
         self.camera = _camera(model, camera)
-        self.model = model
+        self.model, self._coils = model, _tendons(model, "coils", coils)
         self._rectangle = mujoco.MjrRect(0, 0, width, height)
         self._scene = mujoco.MjvScene(model, maxgeom=20_000)
         self._option = mujoco.MjvOption()
@@ -216,7 +224,9 @@ class Offscreen(Closing, Held):
             size = screen.offwidth, screen.offheight
             screen.offwidth, screen.offheight = width, height
             try:
-                self._drawing = mujoco.MjrContext(model, int(mujoco.mjtFontScale.mjFONTSCALE_100))
+                scale = mujoco.mjtFontScale
+                font = scale.mjFONTSCALE_150 if height >= _LARGE else scale.mjFONTSCALE_50
+                self._drawing = mujoco.MjrContext(model, int(font))
             finally:
                 screen.offwidth, screen.offheight = size
             mujoco.mjr_setBuffer(int(mujoco.mjtFramebuffer.mjFB_OFFSCREEN), self._drawing)
@@ -227,8 +237,13 @@ class Offscreen(Closing, Held):
         self._at_exit = functools.partial(_close, weakref.ref(self))
         atexit.register(self._at_exit)
 
-    def draw(self, data: mujoco.MjData) -> NDArray[np.uint8]:
+    def draw(self, data: mujoco.MjData, caption: str = "") -> NDArray[np.uint8]:
         """Picture of ``data``, shape (height, width, 3).
+
+        Args:
+            data: What to draw.
+            caption: What to write into a corner; with it comes a scale of the colours of
+                temperatures.
 
         Raises:
             RuntimeError: If it is closed, or was opened by another thread or process.
@@ -245,10 +260,29 @@ class Offscreen(Closing, Held):
             self.model, data, self._option, None, self.camera,
             int(mujoco.mjtCatBit.mjCAT_ALL), self._scene,
         )
+        wind(self._scene, self.model, data, self._coils, self._rectangle.height)
         mujoco.mjr_render(self._rectangle, self._scene, self._drawing)
+        if caption:
+            self._write(caption)
         pixels = np.empty((self._rectangle.height, self._rectangle.width, 3), dtype=np.uint8)
         mujoco.mjr_readPixels(pixels, None, self._rectangle, self._drawing)
         return np.ascontiguousarray(pixels[::-1])  # OpenGL counts rows from below
+
+    def _write(self, caption: str) -> None:
+        """A caption on the left, and a scale of temperatures on the right of the lower edge."""
+        high, wide = self._rectangle.height, self._rectangle.width
+        corner = int(mujoco.mjtGridPos.mjGRID_BOTTOMLEFT)
+        font = int(mujoco.mjtFont.mjFONT_NORMAL)
+        mujoco.mjr_overlay(font, corner, self._rectangle, caption, "", self._drawing)
+        unit = max(high // 60, 4)
+        stops = np.linspace(COLDEST, HOTTEST, _STOPS)
+        left = wide - (_STOPS + 1) * unit
+        for k, colour in enumerate(temperature_colour(stops).tolist()):
+            box = mujoco.MjrRect(left + k * unit, unit, unit, unit)
+            mujoco.mjr_rectangle(box, *colour, 1.0)
+        above = mujoco.MjrRect(0, 2 * unit, wide, high - 2 * unit)
+        corner, ends = int(mujoco.mjtGridPos.mjGRID_BOTTOMRIGHT), f"{COLDEST:g} to {HOTTEST:g} C"
+        mujoco.mjr_overlay(font, corner, above, ends, "", self._drawing)
 
     def close(self) -> None:
         """Gives the memory back; it may be called again."""
