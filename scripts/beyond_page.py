@@ -97,7 +97,9 @@ class Course:
         cold, hot = np.array([0.86, 0.74, 0.48]), np.array([0.9, 0.25, 0.12])
         polymer = [i for i in range(model.ngeom) if "polymer" in model.geom(i).name]
         model.geom_rgba[polymer, :3] = cold + heat * (hot - cold)
-        with Offscreen(model, width=width, height=height, camera=camera) as screen:
+        with Offscreen(
+            model, width=width, height=height, camera=camera, coils=sim.tendon
+        ) as screen:
             return screen.draw(sim.data)
 
 

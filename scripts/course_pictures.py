@@ -41,7 +41,9 @@ def view(model: mujoco.MjModel, x: float, distance: float, azimuth: float, eleva
 def picture(sim: Simulation, camera: mujoco.MjvCamera, size: tuple[int, int]) -> NDArray[np.uint8]:
     """One picture, TCAs in the colours of their temperatures."""
     colour_tendons(sim.model, sim.tendon, sim.temperature)
-    with Offscreen(sim.model, width=size[0], height=size[1], camera=camera) as screen:
+    with Offscreen(
+        sim.model, width=size[0], height=size[1], camera=camera, coils=sim.tendon
+    ) as screen:
         return screen.draw(sim.data)
 
 

@@ -277,7 +277,9 @@ def draw_shapes(path: Path) -> None:
         sim.model.geom_rgba[polymer, :3] = [
             c + heat * (h - c) for c, h in zip((0.86, 0.74, 0.48), (0.9, 0.25, 0.12), strict=True)
         ]
-        with Offscreen(sim.model, width=640, height=480, camera="stand.front") as screen:
+        with Offscreen(
+            sim.model, width=640, height=480, camera="stand.front", coils=sim.tendon
+        ) as screen:
             pictures.append(screen.draw(sim.data)[10:, 115:525])
         angles.append(bench.angle)
 

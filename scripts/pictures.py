@@ -32,7 +32,9 @@ def view(distance: float, azimuth: float, height: float, elevation: float) -> mu
 def draw(env: ArmPickPlace, camera: mujoco.MjvCamera, width: int, height: int) -> NDArray[np.uint8]:
     """One picture, TCAs in the colours of their temperatures."""
     colour_tendons(env.model, env.sim.tendon, env.sim.temperature)
-    with Offscreen(env.model, width=width, height=height, camera=camera) as screen:
+    with Offscreen(
+        env.model, width=width, height=height, camera=camera, coils=env.sim.tendon
+    ) as screen:
         return screen.draw(env.data)
 
 
@@ -54,7 +56,7 @@ def main(argv: list[str] | None = None) -> None:
         if phase not in frames and policy.since >= MOMENTS.get(phase, np.inf):
             frames[phase] = draw(env, view(0.215, 108.0, 0.075, -10.0), 400, 480)
         if (phase, round(policy.since, 1)) == HERO:
-            hero = draw(env, view(0.165, 118.0, 0.058, -12.0), 1280, 960)
+            hero = draw(env, view(0.15, 48.0, 0.05, -12.0), 1280, 960)
             imageio.imwrite(args.out / "arm.png", hero)
         observation, _, terminated, truncated, _ = env.step(action)
         ended = terminated or truncated

@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 
 from tca_mj.checks import Array
 
-# A TCA has a coil every 0.7 mm, which no picture of a robot resolves: every fourth is drawn.
+# A TCA has a coil every 0.7 mm, which no picture of a robot resolves: every second is drawn.
 # Lengths in units of the tendon's radius, which is that of the coil outside.
-_PITCH, _RADIUS, _WIRE = 4.4, 0.7, 0.38
+_PITCH, _RADIUS, _WIRE = 2.4, 0.7, 0.38
 _SIDES = 7  # pieces of a coil
 _DARK = 0.35  # brightness of what is turned away
 _UPRIGHT = 0.9  # of a first tangent, from which on another direction begins the coil
