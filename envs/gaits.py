@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from tca_mj.envs.recipe import Recipe
+from tca_mj.envs.recipe import HELD, Recipe
 from tca_mj.envs.stance import LEG_TCAS
 from tca_mj.envs.table import Entry, Table
 from tca_mj.robots.tetrapod import TetrapodSpec
@@ -89,6 +89,9 @@ RECIPES = {
         "sac": Recipe.held(
             steps, 0.4, timestep=10e-3, options={"randomise": 0.2}, mirrored=True,
             growth={"wander": 10_000}, start=first,
+            # All directions at once take a larger network, and from chance.
+            grown={"steps": 32_000, "start": "random",
+                   "learner": {**HELD, "hidden": (256, 256)}},
         ),
     }
     for gait, (steps, first) in _LEARNED.items()

@@ -14,7 +14,7 @@ _Steps = Annotated[int, partial(whole, at_least=1, at_most=1_000_000_000)]
 _Discount = Annotated[float, partial(number, above=0.0, at_most=1.0)]
 
 # The best of what was tried on gaits: docs/gaits.md.
-_HELD = {
+HELD: Mapping[str, Any] = {
     "learning_rate": 1e-3, "last_rate": 0.1, "batch_size": 256, "tau": 0.01,
     "ent_coef": "auto_0.05", "learning_starts": 1200, "gradient_steps": 8, "hidden": (128, 128),
     "buffer_size": 50_000,
@@ -37,6 +37,7 @@ class Recipe(Checked):
         mirrored: Whether half of each batch of memories is mirrored, left for right.
         growth: Options that grow from 0 to the value that is given, and in how many steps. With one
             of them memories are also told with other commands, and mirrored front for rear.
+        grown: Fields of this that are others where one of them is given.
         discount: What a reward is worth that comes a second later, above 0 up to 1; None for the
             learner's own, per step [1].
         start: Whose steps come first in the memory: those of a gait, as in ``TrainConfig``, or
@@ -57,6 +58,7 @@ class Recipe(Checked):
     scaled: bool = False
     mirrored: bool = False
     growth: Mapping[str, int] = field(default_factory=dict)
+    grown: Mapping[str, Any] = field(default_factory=dict)
     discount: _Discount | None = None
     start: str = "random"
     learner: Mapping[str, Any] = field(default_factory=dict)
@@ -77,5 +79,5 @@ class Recipe(Checked):
         """
         return cls(
             steps=steps, control_period=control_period, scaled=True, discount=0.94, interval=1000,
-            learner=_HELD, **more,
+            **{"learner": HELD, **more},
         )  # fmt: skip

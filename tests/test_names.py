@@ -61,7 +61,7 @@ INTERNAL = {
         "options": "variation_of",
         "holding": "*", "objects": "*",
         "outcome": "broken_off finite harm how_it_ended measured together",
-        "rewards": "*",
+        "recipe": "HELD", "rewards": "*",
         "stance": "*", "table": "commands", "task": "parts",
     },
     "tca_mj.agents": {

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from functools import partial
 from typing import Annotated, Any
 
@@ -225,6 +225,8 @@ def default_config(task: str, algorithm: str | None = None, **change: Any) -> Tr
     known = task_class(task)
     algorithm = algorithm or best_algorithm(task)
     recipe = recipes(task).get(algorithm, Recipe(steps=_STEPS))
+    if any(change.get("options", {}).get(name) for name in recipe.growth):
+        recipe = replace(recipe, **recipe.grown)
     if change.get("residual"):
         recipe = Recipe(
             steps=recipe.steps, action="power", options=recipe.options, start="scripted"
