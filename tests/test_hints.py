@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from functools import partial
 
 import pytest
 
@@ -10,7 +11,6 @@ from tca_mj import (
     CATALOGUE,
     ArmSpec,
     BendingSpec,
-    FibreSpec,
     FingerPairSpec,
     Helix,
     LegSpec,
@@ -37,8 +37,9 @@ from tca_mj.tca import FREE_STROKE_CREPT, MODULE_TCAS
 
 TCA = CATALOGUE["free-stroke"]
 BEAM = silicone_cylinder(45e-3, 4.5e-3, 9e-3)
-MANDREL = {"fibre": FibreSpec(), "fibre_length": 0.35, "core_diameter": 1.3e-3,
-           "groove_pitch_angle": 0.4}  # fmt: skip
+FIBRE = partial(replace, TCA.fibre)
+MANDREL = {"fibre": TCA.fibre, "fibre_length": 0.35, "core_diameter": 1.3e-3,
+           "groove_pitch_angle": 0.4, "resistance_per_length": 67.0}  # fmt: skip
 
 
 def mandrel(**change):
@@ -52,10 +53,10 @@ def mandrel(**change):
         (mandrel, "fibre_length", 350, "0.35 m"),
         (mandrel, "groove_pitch_angle", 22.9, "0.3997 rad"),
         (mandrel, "minimum_pitch_angle", 11.5, "0.2007 rad"),
-        (FibreSpec, "radius", 0.21, "0.00021 m"),
-        (FibreSpec, "radius", 210, "0.00021 m"),
-        (FibreSpec, "young", 1.2, "1.2e+09 Pa"),
-        (FibreSpec, "line_density", 117, "0.000117 kg/m"),
+        (FIBRE, "radius", 0.21, "0.00021 m"),
+        (FIBRE, "radius", 210, "0.00021 m"),
+        (FIBRE, "young", 1.2, "1.2e+09 Pa"),
+        (FIBRE, "line_density", 117, "0.000117 kg/m"),
         (lambda **change: replace(TCA, **change), "coil_radius", 0.427, "0.000427 m"),
         (lambda **change: replace(TCA, **change), "fibre_length", 175.0, "0.175 m"),
         (lambda **change: replace(TCA, **change), "pitch_angle", 14.9, "0.2601 rad"),

@@ -32,6 +32,7 @@ def test_from_mandrel_gives_table_2_1(name, groove, annealed, made):
         "core_diameter": 0.405e-3,
         "groove_pitch_angle": math.radians(groove),
         "minimum_pitch_angle": math.radians(11.53),
+        "resistance_per_length": known.resistance_per_length,
     }
     as_made = TcaSpec.from_mandrel(**making)
     assert 1e3 * as_made.rest_length == pytest.approx(made, rel=0.025)
@@ -47,9 +48,11 @@ def test_from_mandrel_gives_table_2_1(name, groove, annealed, made):
 
 
 def test_from_mandrel_touches_at_close_packing():
-    making = {"fibre": MADE.fibre, "fibre_length": 0.175, "core_diameter": 2e-3 * (0.408 - 0.21)}
+    making = {"fibre": MADE.fibre, "fibre_length": 0.175, "core_diameter": 2e-3 * (0.408 - 0.21),
+              "resistance_per_length": 67.0}  # fmt: skip
     spec = TcaSpec.from_mandrel(**making, groove_pitch_angle=math.radians(22.42))
-    assert spec == MADE
+    wire = {name: getattr(MADE, name) for name in ("stretch_resistance", "contraction_resistance")}
+    assert replace(spec, breaking_force=0.78, **wire) == MADE
     for field, value in (("groove_pitch_angle", 0.1), ("groove_pitch_angle", 1.6)):
         with pytest.raises(ValueError, match="pitch_angle"):
             TcaSpec.from_mandrel(**making | {field: value})

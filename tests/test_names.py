@@ -30,9 +30,10 @@ INTERNAL = {
     "tca_mj.smp": {"damage": "damaging", "fixing": "with_glass", "heater": "heated"},
     "tca_mj.tca": {
         "arrays": "*", "laws.castigliano": "*", "laws.coil": "*", "laws.love": "*",
-        "laws.model": "*", "laws.rod": "Point require_domain sheared",
+        "laws.model": "*", "laws.plies": "*", "laws.rod": "Point require_domain sheared",
         "laws.roots": "bracketed closed", "laws.table": "coil_alone evaluate solved",
-        "moduli": "softened", "spec": "heat_of", "thermal": "BareStep require_bare",
+        "materials": "Named", "moduli": "softened", "spec": "heat_of",
+        "thermal": "BareStep require_bare",
     },
     "tca_mj.rod": {
         "deadload": "*", "energy": "*", "lie": "*", "problem": "StaticProblem asked",

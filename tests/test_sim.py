@@ -15,7 +15,7 @@ from tca_mj.modules.bending import BendingSpec, bending_module
 from tca_mj.modules.finger import finger_pair
 from tca_mj.routes import Helix, leg_length
 from tca_mj.sim import Simulation, SimulationDiverged, SimulationOverheated
-from tca_mj.tca import CATALOGUE, FibreSpec, HeatStep, Supply, Thermostat
+from tca_mj.tca import CATALOGUE, MATERIALS, HeatStep, Supply, Thermostat
 
 
 def simulation(**options):
@@ -225,7 +225,8 @@ def test_robots_use_the_surface_and_the_rod_where_there_is_none():
     with pytest.raises(ValueError, match=r"law must be one of .* or a Callable, got 'table'"):
         simulation(law="table")
     part = bending_module()
-    fibre = FibreSpec(radius=0.2e-3, young=7e9, shear=0.1e9)
+    thread = MATERIALS["silver-coated nylon sewing thread"].measured
+    fibre = replace(thread, radius=0.2e-3, young=7e9, shear=0.1e9)
     steep = replace(CATALOGUE["free-stroke"], fibre=fibre, coil_radius=1.2e-3, pitch_angle=0.8)
     length = part.tcas[0].spec.rest_length
     part.tcas = (replace(part.tcas[0], spec=steep.of_length(length)), *part.tcas[1:])

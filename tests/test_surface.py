@@ -8,17 +8,18 @@ import pytest
 
 from tca_mj.tca import (
     CATALOGUE,
+    MATERIALS,
     BodyHeat,
     CalibrationError,
     CoilRods,
     CoilSurfaces,
-    FibreSpec,
     TcaBank,
     TcaState,
     calibrate,
 )
 
 FREE_STROKE = CATALOGUE["free-stroke"]
+THREAD = MATERIALS["silver-coated nylon sewing thread"].measured
 HOT_SECTION = replace(FREE_STROKE, fibre=replace(FREE_STROKE.fibre, section="hot"), ambient=20.0)
 SPECS = [*CATALOGUE.values(), HOT_SECTION]
 IDS = [*CATALOGUE, "free-stroke with hot section"]
@@ -196,7 +197,7 @@ def test_outside_its_domain_it_refuses_as_the_rod_does(length, temperature, matc
 
 def test_a_coil_that_buckles_has_no_surface():
     """Steep, soft in torsion: the rod's own tension falls with length."""
-    fibre = FibreSpec(radius=0.2e-3, young=7e9, shear=0.1e9)
+    fibre = replace(THREAD, radius=0.2e-3, young=7e9, shear=0.1e9)
     spec = replace(FREE_STROKE, fibre=fibre, coil_radius=1.2e-3, pitch_angle=0.8)
     with pytest.raises(CalibrationError, match="falls with length"):
         calibrate(spec)
@@ -204,7 +205,7 @@ def test_a_coil_that_buckles_has_no_surface():
 
 def test_fine_tables_for_unusual_coils():
     """A thick fibre in a steep coil: a finer grid is taken, and the bound still met."""
-    fibre = FibreSpec(radius=1e-3, section="hot")
+    fibre = replace(THREAD, radius=1e-3, section="hot")
     spec = replace(FREE_STROKE, fibre=fibre, coil_radius=1.3e-3, pitch_angle=0.5)
     surface = calibrate(spec)
     assert surface.cells > (32, 40)

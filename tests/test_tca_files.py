@@ -11,6 +11,7 @@ from tca_mj.tca import (
     CATALOGUE,
     BodyHeat,
     FibreSpec,
+    Plies,
     Source,
     TcaFile,
     TcaSpec,
@@ -23,8 +24,10 @@ from tca_mj.tca import files as tca_files
 FREE_STROKE = CATALOGUE["free-stroke"]
 ODD = replace(  # numbers that need all their digits, and a body
     BendingSpec().embedded, coil_radius=0.1 * 0.0043, heat_loss=math.pi / 40.0,
-    fibre=replace(FREE_STROKE.fibre, young=1e10 / 9.0, section="hot"),
+    fibre=replace(FREE_STROKE.fibre, young=1e10 / 9.0, section="hot"), breaking_force=None,
+    plies=Plies(strands=3, lay_angle=1.0 / 7.0),
 )  # fmt: skip
+KINDS = (FibreSpec, "fibre."), (TcaSpec, ""), (BodyHeat, "body."), (Plies, "plies.")
 SOURCES = {
     "fibre.young": Source(kind="fitted", error=1e7 / 3.0, data="pull.csv"),
     "fibre.expansion": Source(kind="published", error=(1e-7, 1e-6, 0.0), data="Sun, 3.1.2"),
@@ -49,16 +52,17 @@ def test_no_digit_is_lost(spec, path):
 def test_units_are_those_of_the_docstrings():
     """Every number of the specifications has a unit in a file, and it is the documented one."""
     documented = {}
-    for kind, before in ((FibreSpec, "fibre."), (TcaSpec, ""), (BodyHeat, "body.")):
+    for kind, before in KINDS:
         for name in (field.name for field in fields(kind)):
             rows = rf"^ +{name}: (.*?)(?=^ {{8}}\w+: |\Z|^ *$)"
             about = re.search(rows, kind.__doc__, re.MULTILINE | re.DOTALL)
             documented[before + name] = re.findall(r"\[([^\[\]]+)\]", about[1])[-1:]
-    without = {"fibre", "body", "fibre.section", "fibre.load_softening", "fibre.expansion"}
-    assert {name: [tca_files._UNITS[name]] for name in documented.keys() - without} == {
-        name: unit for name, unit in documented.items() if name not in without
-    }
-    assert tca_files._UNITS.keys() == documented.keys() - {"fibre", "body"}
+    for part in ("fibre", "body", "plies"):
+        del documented[part]
+    units = tca_files._UNITS
+    assert units.keys() == documented.keys()
+    for name in documented.keys() - {"fibre.section", "fibre.load_softening", "fibre.expansion"}:
+        assert documented[name] == [units[name]], name
 
 
 @pytest.mark.parametrize(

@@ -8,9 +8,9 @@ import pytest
 
 from tca_mj.tca import (
     CATALOGUE,
+    MATERIALS,
     MODULE_TCAS,
     BodyHeat,
-    FibreSpec,
     FibreTable,
     TcaSpec,
     radial_growth,
@@ -21,6 +21,7 @@ from tca_mj.tca import (
 
 FREE_STROKE = CATALOGUE["free-stroke"]
 LOADED = FREE_STROKE.fibre
+THREAD = MATERIALS["silver-coated nylon sewing thread"].measured
 
 
 @pytest.mark.parametrize(
@@ -171,7 +172,7 @@ def test_bad_tcas_are_refused(field, value):
 )
 def test_bad_fibres_are_refused(field, value):
     with pytest.raises(ValueError, match=field):
-        replace(FibreSpec(), **{field: value})
+        replace(THREAD, **{field: value})
 
 
 def test_of_length_refuses_nonsense():
@@ -194,14 +195,14 @@ def test_growth_is_the_published_polynomial_over_its_value_at_rest():
     temperature = np.linspace(-20.0, 200.0, 45)
     gamma = 3.5e-6 * temperature**2 - 6.7e-5 * temperature + 1.0
     gamma0 = 3.5e-6 * 25.0**2 - 6.7e-5 * 25.0 + 1.0
-    growth = radial_growth(FibreSpec(), temperature)
+    growth = radial_growth(THREAD, temperature)
     np.testing.assert_allclose(growth, gamma / gamma0 - 1.0, rtol=0, atol=1e-15)
-    assert radial_growth(FibreSpec(), 25.0) == 0.0
+    assert radial_growth(THREAD, 25.0) == 0.0
 
 
 def test_a_hot_fibre_untwists():
     """A filament of constant length keeps r theta: theta falls as the radius grows."""
-    fibre = FibreSpec()
+    fibre = THREAD
     for temperature in (25.0, 80.0, 160.0):
         lost = float(untwist(fibre, temperature))
         radius = 1.0 + float(radial_growth(fibre, temperature))
@@ -218,7 +219,7 @@ def test_untwist_against_the_second_published_fit(temperature):
     """Sun, Chapter 5, fits the same measurement in rad/m directly; its value at 25 °C is offset."""
     second = np.poly1d([-0.0161, 0.3338, -7.7311])
     expected = second(temperature) - second(25.0)
-    assert untwist(FibreSpec(), temperature) == pytest.approx(expected, rel=0.06)
+    assert untwist(THREAD, temperature) == pytest.approx(expected, rel=0.06)
 
 
 def test_moduli_at_the_reference_temperature_are_the_measured_ones():
@@ -282,7 +283,7 @@ def test_softened_tension_is_smooth_through_zero():
 
 
 def test_a_table_of_fibres_is_its_fibres():
-    fibres = [FibreSpec(), LOADED, CATALOGUE["self-coiled"].fibre, CATALOGUE["type-0-180"].fibre]
+    fibres = [THREAD, LOADED, CATALOGUE["self-coiled"].fibre, CATALOGUE["type-0-180"].fibre]
     table = FibreTable.of(fibres)
     temperature = np.array([25.0, 60.0, 110.0, 160.0])
     for i, fibre in enumerate(fibres):

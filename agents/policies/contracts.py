@@ -68,7 +68,7 @@ def digest(made_for: Contract) -> str:
 
 @door
 def differences(needed: Contract, given: Contract) -> list[str]:
-    """Where two contracts differ, in words, part by part.
+    """Where two contracts differ, in words, part by part. What is None is as good as missing.
 
     Args:
         needed: What a policy was made for.
@@ -83,10 +83,9 @@ def differences(needed: Contract, given: Contract) -> list[str]:
         names = [*mine, *(name for name in other if name not in mine)]
         apart = [
             f"{name!r} {_said(mine, name)}, not {_said(other, name)}"
-            for name in names
-            if (name in mine) != (name in other) or mine.get(name) != other.get(name)
+            for name in names if mine.get(name) != other.get(name)
         ]  # fmt: skip
-        if not apart and list(mine) != list(other):
+        if not apart and part != ROBOT and list(mine) != list(other):
             apart = ["its rows in another order"]
         if apart:
             more = f" and {len(apart) - _SHOWN} more" if len(apart) > _SHOWN else ""

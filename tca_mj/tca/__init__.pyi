@@ -22,7 +22,7 @@ from tca_mj.tca.laws.statics import hanging_length, law_at, pulling_temperature,
 from tca_mj.tca.laws.surface import CoilSurfaces
 from tca_mj.tca.laws.table import CalibrationError, Surface, SurfaceBound, calibrate
 from tca_mj.tca.mandrel import kept_share
-from tca_mj.tca.materials import Source
+from tca_mj.tca.materials import MATERIALS, Material, Source
 from tca_mj.tca.moduli import FibreTable, radial_growth, softened_tension, softening, untwist
 from tca_mj.tca.sensing.sensor import (
     CurrentSensor,
@@ -40,7 +40,7 @@ from tca_mj.tca.sensing.wire import (
     resistance_displacement,
     sensed_length,
 )
-from tca_mj.tca.spec import FibreSpec, TcaSpec
+from tca_mj.tca.spec import FibreSpec, Plies, TcaSpec, still_air_loss
 from tca_mj.tca.supply import Supply, Thermostat
 from tca_mj.tca.thermal import (
     BodyHeat,
@@ -56,13 +56,14 @@ __all__ = [
     "CoilSolveError", "CoilSurfaces", "ConicalTca", "Course", "CreepBank", "CreepSpec",
     "CreepState", "CurrentSensor", "DisplacementFit", "FREE_STROKE_CREPT", "FibreShape",
     "FibreSpec", "FibreTable", "HeatSpec", "HeatStep", "Heating", "LawChoice", "Load", "LoadState",
-    "LoadedTcas", "MODULE_TCAS", "MotionSolveError", "Pull", "SensingSpec", "Signal", "Source",
-    "Stiffness", "Supply", "Surface", "SurfaceBound", "TcaBank", "TcaFile", "TcaMelted", "TcaSpec",
-    "TcaState", "TensionLaw", "Thermostat", "WireTable", "aged", "calibrate", "coil_tension",
-    "fibre_stiffness", "find_tca", "fit_displacement", "hanging_length", "heat_lost",
-    "hysteresis_damping", "in_silicone", "kept_share", "law_at", "measured", "moving_average",
-    "power_from_voltage", "pulling_temperature", "pulse_mean", "pulse_power", "radial_growth",
-    "read_tca", "relaxation_time", "resistance", "resistance_displacement", "ring_conductance",
-    "sensed_length", "silicone_body", "softened_tension", "softening", "solve_course",
-    "solve_fibre", "step_temperature", "tension", "untwist", "write_tca",
+    "LoadedTcas", "MATERIALS", "MODULE_TCAS", "Material", "MotionSolveError", "Plies", "Pull",
+    "SensingSpec", "Signal", "Source", "Stiffness", "Supply", "Surface", "SurfaceBound", "TcaBank",
+    "TcaFile", "TcaMelted", "TcaSpec", "TcaState", "TensionLaw", "Thermostat", "WireTable", "aged",
+    "calibrate", "coil_tension", "fibre_stiffness", "find_tca", "fit_displacement",
+    "hanging_length", "heat_lost", "hysteresis_damping", "in_silicone", "kept_share", "law_at",
+    "measured", "moving_average", "power_from_voltage", "pulling_temperature", "pulse_mean",
+    "pulse_power", "radial_growth", "read_tca", "relaxation_time", "resistance",
+    "resistance_displacement", "ring_conductance", "sensed_length", "silicone_body",
+    "softened_tension", "softening", "solve_course", "solve_fibre", "step_temperature",
+    "still_air_loss", "tension", "untwist", "write_tca",
 ]  # fmt: skip

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -12,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from tca_mj.checks import Array, door, every, floats, instance, shown, some, within
 from tca_mj.tca.arrays import column, frozen
 from tca_mj.tca.laws.law import LawChoice, TensionLaw
+from tca_mj.tca.laws.plies import law_of
 from tca_mj.tca.laws.rod import CoilRods
 from tca_mj.tca.laws.surface import CoilSurfaces
 from tca_mj.tca.sensing.wire import WireTable, resistance
@@ -111,7 +113,8 @@ class TcaBank:
         minimum_length: Lengths at which the coils touch, shape (n,) [m].
         shortest: Shortest length that ``pull`` accepts, shape (n,) [m].
         longest: Longest length that ``pull`` accepts, shape (n,) [m].
-        breaking_force: Tensions at which the TCAs break, shape (n,) [N].
+        breaking_force: Tensions at which the TCAs break, infinite where that is not known, shape
+            (n,) [N].
         max_temperature: Upper ends of the range of the fibre's measurements, shape (n,) [°C].
         melting_temperature: Temperatures that no TCA can have, shape (n,) [°C].
         embedded: Which TCAs lie in a body, shape (n,).
@@ -145,7 +148,7 @@ class TcaBank:
         if not callable(law) and law not in _LAWS:
             raise ValueError(f"law must be 'rod' or 'surface', got {law!r}")
         self.law = law
-        self._law = law if callable(law) else _LAWS[law]
+        self._law = partial(law_of, law=law if callable(law) else _LAWS[law])
         self._coils = self._law(self.specs)
         for name in ("shortest", "longest", "tension"):
             if not hasattr(self._coils, name):
@@ -158,7 +161,7 @@ class TcaBank:
         self.rest_length = column(self.specs, "rest_length")
         self.minimum_length = column(self.specs, "minimum_length")
         self.shortest, self.longest = self._coils.shortest, self._coils.longest
-        self.breaking_force = column(self.specs, "breaking_force")
+        self.breaking_force = column(self.specs, "breaking_tension")
         self.max_temperature = frozen([spec.fibre.temperature_range[1] for spec in self.specs])
         self.melting_temperature = frozen([s.fibre.melting_temperature for s in self.specs])
         self.embedded = np.array([spec.body is not None for spec in self.specs])

@@ -8,7 +8,7 @@
        "fibre_length": {"value": 0.175, "unit": "m"}, ...}}
 
 A value has the name that it has in ``TcaSpec``, with dots. All must be there, so that a file means
-the same for ever, but for what the specification has not (``body.``, which is None for a bare TCA).
+the same for ever, but for what is None there: ``body``, ``plies``, ``breaking_force``.
 Numbers are written with all their digits: what is read is what was written, to the last bit.
 """
 
@@ -43,7 +43,7 @@ _UNITS: Mapping[str, str | list[str] | None] = {
     "breaking_force": "N", "resistance_per_length": "ohm/m", "stretch_resistance": "1",
     "contraction_resistance": "1", "heat_loss": "W/(m K)", "ambient": "°C",
     "body.conductance": "W/(m K)", "body.capacity": "J/(m K)", "body.loss": "W/(m K)",
-    "contact_ratio": "1", "contact_smoothing": "1",
+    "contact_ratio": "1", "contact_smoothing": "1", "plies.strands": "1", "plies.lay_angle": "rad",
 }  # fmt: skip
 
 

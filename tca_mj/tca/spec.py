@@ -1,9 +1,7 @@
 """What a twisted-and-coiled actuator (TCA) is made of.
 
-"Sun" below is J. Sun's dissertation, Colorado State University; its Chapter 2 and its
-Chapter 3 twist the same thread under the same weight, so that one fibre is behind both, but for
-the inserted twist and the mass per length, which are printed twice. What was weighed is a number of
-its own and does not follow from the radius, which is the one that the moduli were fitted with.
+Nothing here is the number of a thread: materials stand in ``materials.py``, published TCAs in
+``catalogue.py``. "Sun" below is J. Sun's dissertation, Colorado State University.
 """
 
 from __future__ import annotations
@@ -12,7 +10,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from functools import partial
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from tca_mj.checks import (
     Checked,
@@ -23,6 +21,7 @@ from tca_mj.checks import (
     door,
     number,
     quantity,
+    whole,
     within,
 )
 from tca_mj.hints import angle, modulus, size
@@ -35,6 +34,9 @@ _UPRIGHT = math.pi / 2.0  # pitch of a straight fibre [rad]
 _STRETCH_TO_SHEAR = 0.1, 1000.0  # bounds of E/G, estimates: 2 to 3 if isotropic, nylon to 15
 _STEEPEST = 10.0  # slope of filaments around a fibre; fibres coil by themselves from about 1 on
 
+# Default of what has none, though Python would take "missing 9 arguments" for an answer.
+_ASKED: Any = None
+
 _Modulus = Annotated[float, partial(modulus, typed=1e9)]
 _LineDensity = Annotated[float, partial(size, kind="fibres", at_most=0.1, unit="kg/m")]
 _length = partial(size, kind="threads", at_most=10.0)
@@ -44,21 +46,22 @@ _pitch = partial(angle, below=_UPRIGHT)
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class FibreSpec(Checked):
-    """The twisted fibre (thread) of a TCA. Defaults: Sun, Tables 3.1 and Section 3.2.2.
+    """The twisted fibre (thread) of a TCA.
+
+    It has no number of its own but for what is 1, or no influence, if nothing else is known. A
+    fibre of a known material is ``MATERIALS[name].fibre(...)``.
 
     Attributes:
-        radius: Radius r_t of the circle that carries load, when cold: the moduli were fitted with
-            it (Sun, Table 3.1). Fibre measured across is 0.34 mm thick [m].
+        radius: Radius r_t of the circle that carries load, when cold: the one that the moduli were
+            found with. A thread measured across may be thinner [m].
         young: Measured longitudinal Young's modulus E at the reference temperature, 0.1 to 1000
             times ``shear`` [Pa].
         shear: Measured longitudinal shear modulus G at the reference temperature [Pa].
-        filament_young: Young's modulus E_f0 of the filament, nylon 6,6 [Pa].
+        filament_young: Young's modulus E_f0 of the filament; of a monofilament ``young`` [Pa].
         softening: Fall of E_f per kelvin, Sun, eq. (3.11) [Pa/K].
         load_softening: Coefficients (mu2, mu1, mu0) of the polynomial lambda(tau) by which
             a torsion tau [rad/m] multiplies that fall, Sun, eq. (3.11). (0, 0, 1) is no
-            influence of the load. The other published set, (3.24e-4, -0.027, 1), was
-            fitted to three loads of the free-stroke TCA up to 60 g (tau = 171 rad/m) and is
-            an extrapolation beyond.
+            influence of the load.
         inserted_twist: Twist inserted before annealing, per fibre length, at most 10 / ``radius``
             [rad/m].
         untwist_scale: Factor on the untwist, 1 unless a coil was fitted with another, at most 10
@@ -67,37 +70,44 @@ class FibreSpec(Checked):
             Gamma(T) = c2 T^2 + c1 T + c0 with T in °C, Sun, Section 3.1.2. The constant term
             is the one near 1. The laws divide Gamma by its value at the
             reference temperature, so that a cold TCA is at rest.
-        line_density: Mass per length of twisted fibre [kg/m]. The thread is sold as 235/36 dtex,
-            4 ply, 94 mg per metre, and 218 mm of it become 175 mm (Sun, Section 2.1.1 and Table
-            3.2): 117 mg/m. The other printed data agree, 1300 kg/m^3 (Table 3.1) on 0.34 mm
-            (Table 2.1) is 118 mg/m; on the circle that carries load it would be 180 mg/m.
+        line_density: Mass per length of twisted fibre, as weighed: it does not follow from
+            ``radius`` [kg/m].
         specific_heat: Heat capacity per mass [J/(kg K)].
         reference_temperature: Temperature T_0 at which the TCA has its natural shape [°C].
         temperature_range: Lowest and highest temperature of the measurements behind
             ``expansion`` and ``softening`` [°C]; the laws extrapolate beyond it.
-        melting_temperature: Temperature above which there is no fibre [°C]: an estimate from
-            handbook values of nylon 6,6, 255 to 265 °C.
+        melting_temperature: Temperature above which there is no fibre [°C].
         section: Whether A, I and J belong to the cold radius or grow with Gamma. An open
             choice, not settled by the source: "cold" is an assumption.
+
+    Raises:
+        ValueError: If a number is out of bounds, or one is left out that only a material has.
     """
 
-    radius: Annotated[float, partial(size, kind="fibres", at_most=5e-3)] = 0.21e-3
-    young: _Modulus = 1.2e9
-    shear: _Modulus = 0.22e9
-    filament_young: _Modulus = 3.9e9
-    softening: float = 0.0011e9
+    radius: Annotated[float, partial(size, kind="fibres", at_most=5e-3)] = _ASKED
+    young: _Modulus = _ASKED
+    shear: _Modulus = _ASKED
+    filament_young: _Modulus = _ASKED
+    softening: float = _ASKED
     load_softening: Triple = (0.0, 0.0, 1.0)
-    inserted_twist: NotNegative = 4710.0
+    inserted_twist: NotNegative = _ASKED
     untwist_scale: Annotated[float, partial(quantity, at_least=0.0, at_most=10.0)] = 1.0
-    expansion: Triple = (3.5e-6, -6.7e-5, 1.0)
-    line_density: _LineDensity = 4 * 23.5e-6 * 218.0 / 175.0
-    specific_heat: Positive = 1267.0
+    expansion: Triple = _ASKED
+    line_density: _LineDensity = _ASKED
+    specific_heat: Positive = _ASKED
     reference_temperature: float = 25.0
-    temperature_range: tuple[float, float] = (25.0, 160.0)
-    melting_temperature: float = 260.0
+    temperature_range: tuple[float, float] = _ASKED
+    melting_temperature: float = _ASKED
     section: Literal["cold", "hot"] = "cold"
 
     def __post_init__(self) -> None:
+        missing = [each.name for each in fields(self) if getattr(self, each.name) is None]
+        if missing:
+            raise ValueError(
+                f"{', '.join(missing)} must be given, got nothing: name the material by"
+                " MATERIALS[...].fibre(radius=..., inserted_twist=..., line_density=...), or say"
+                " all numbers of another one"
+            )
         Checked.__post_init__(self)
         (mu2, mu1, mu0), (c2, c1, c0) = self.load_softening, self.expansion
         low, high = (share * self.shear for share in _STRETCH_TO_SHEAR)
@@ -152,8 +162,29 @@ class FibreSpec(Checked):
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
+class Plies(Checked):
+    """Equal strands, each a coil of its own, that pull as one TCA, current through all of them.
+
+    Side by side they have the TCA's length and share its tension: exact. Wound round each other
+    they are longer, and their winding w is kept: strand^2 = length^2 + w^2. That is exact for
+    strands that only pull, on a cylinder that keeps its radius; left out are what bends and twists
+    the strands' own axes, how their twists hold each other, and friction between them.
+
+    Attributes:
+        strands: How many, 2 to 100 [1].
+        lay_angle: Angle between strands and TCA at the natural length, 0 for side by side, below
+            pi/4 [rad].
+    """
+
+    strands: Annotated[int, partial(whole, at_least=2, at_most=100)]
+    lay_angle: Annotated[
+        float, partial(quantity, at_least=0.0, below=math.pi / 4.0, unit="rad")
+    ] = 0.0  # fmt: skip
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
 class TcaSpec(Checked):
-    """One TCA: a fibre wound to a helix, and its heat and resistance.
+    """One TCA: a fibre wound to a helix, and its heat and resistance; or several such strands.
 
     Attributes:
         fibre: The twisted fibre.
@@ -161,24 +192,22 @@ class TcaSpec(Checked):
         coil_radius: Radius r* of the fibre's centre line at the natural length [m].
         pitch_angle: Pitch angle alpha* at the natural length [rad].
         minimum_pitch_angle: Pitch angle at which neighbouring coils touch [rad].
-        breaking_force: Tension at which the TCA breaks, Sun, Section 2.1.1, type 2-200 [N].
-        resistance_per_length: Electrical resistance per *natural length* of the TCA (not per
-            fibre length), Sun, Table 2.3: 6.7 ohm/dm [ohm/m].
-        stretch_resistance: Relative fall of the resistance per unit strain of a TCA that is
-            stretched beyond its natural length. Sun, Section 2.3.1: 0.55 ohm for 50 % on a cold
-            TCA of 110 mm, which has 7.37 ohm: 0.55/7.37/0.5 [1].
+        breaking_force: Tension at which a coil breaks; None if that is not known [N].
+        resistance_per_length: Electrical resistance per *natural length* of a coil (not per fibre
+            length) [ohm/m].
+        stretch_resistance: Relative fall of the resistance per unit strain of a coil that is
+            stretched beyond its natural length [1].
         contraction_resistance: Relative rise of the resistance per unit contraction below the
-            natural length. Fitted to "~20 %" over the actuation (Sun, Section 3.1.1), which is the
-            free stroke of 35.7 % (Table 2.1) [1].
+            natural length [1].
         heat_loss: Heat lost to still air per length of *fibre* and excess temperature of a bare
-            TCA, h c_s 2 pi r_t. Sun, Table 3.1 and Section 3.1.1: h = 23 W/(m^2 K), c_s = 2.5, r_t
-            = 0.21 mm. Only the product was identified, by a regression (Section 3.5.2), so that it
-            is one number here, and the same for all TCAs of this thread [W/(m K)].
+            TCA; of several strands, by each [W/(m K)].
         ambient: Temperature of the surroundings [°C].
         body: The soft body that the TCA lies in and gives its heat to; None for a bare TCA.
         contact_ratio: Stiffness of touching coils over that of the cold coil: an estimate [1].
         contact_smoothing: Range over which the contact sets in, as a share of the minimum
             length: an estimate [1].
+        plies: Several strands, all that stands above being that of each; None for one. In still air
+            each loses its heat as if it hung alone, which strands that touch do not quite.
 
     Example:
         >>> from tca_mj import CATALOGUE
@@ -192,15 +221,16 @@ class TcaSpec(Checked):
     coil_radius: Annotated[float, _coil]
     pitch_angle: Annotated[float, _pitch]
     minimum_pitch_angle: float
-    breaking_force: Positive = 0.78
-    resistance_per_length: Positive = 67.0
-    stretch_resistance: float = 0.55 / (67.0 * 0.110) / 0.5
-    contraction_resistance: NotNegative = 0.20 / 0.357
-    heat_loss: Positive = 23.0 * 2.5 * 2.0 * math.pi * 0.21e-3
+    breaking_force: Positive | None = None
+    resistance_per_length: Positive
+    stretch_resistance: float = 0.0
+    contraction_resistance: NotNegative = 0.0
+    heat_loss: Positive
     ambient: Temperature = 25.0
     body: BodyHeat | None = None
     contact_ratio: Positive = 50.0
     contact_smoothing: Annotated[float, partial(number, above=0.0, below=1.0)] = 0.005
+    plies: Plies | None = None
 
     def __post_init__(self) -> None:
         Checked.__post_init__(self)
@@ -208,6 +238,84 @@ class TcaSpec(Checked):
         angle("minimum_pitch_angle", self.minimum_pitch_angle, below=self.pitch_angle)
         stretch = max(1.0 / math.sin(self.pitch_angle) - 1.0, 1e-300)  # there no resistance is left
         number("stretch_resistance", self.stretch_resistance, at_least=0.0, below=1.0 / stretch)
+        # Beyond it the strands lie across before their coils touch.
+        across = math.sin(self.minimum_pitch_angle) / math.sin(self.pitch_angle)
+        number("plies.lay_angle", self.lay_angle, below=math.asin(across), unit="rad")
+
+    @classmethod
+    @door
+    def from_measured(
+        cls,
+        *,
+        fibre: FibreSpec,
+        rest_length: Annotated[float, _length],
+        resistance: Positive,
+        fibre_length: Annotated[float, _length] | None = None,
+        outer_diameter: Annotated[float, _coil] | None = None,
+        coils: Positive | None = None,
+        thickness: Annotated[float, _coil] | None = None,
+        contact_length: Annotated[float, _length] | None = None,
+        mass: Annotated[float, partial(size, kind="TCAs", at_most=1.0, unit="kg")] | None = None,
+        breaking_force: Positive | None = None,
+        heat_loss: Positive | None = None,
+        plies: Plies | None = None,
+    ) -> TcaSpec:
+        """A TCA that lies on the bench, from what ruler, caliper, scale and ohmmeter say of it.
+
+        Of fibre length, outer diameter and number of coils two are given, and the third follows.
+
+        Args:
+            fibre: The twisted fibre.
+            rest_length: Natural length, cold, without load, after its training [m].
+            resistance: Resistance from end to end at that length [ohm].
+            fibre_length: Length of the twisted fibre in the coil, before it was wound [m].
+            outer_diameter: Of the coil, across [m].
+            coils: Their number.
+            thickness: Of the twisted fibre, across, which is taken off the outer diameter; None for
+                twice ``fibre.radius``, though that is of the circle that carries load [m].
+            contact_length: Length when it is hot and its coils touch; None for close packing, which
+                real threads do not reach: see ``from_mandrel`` [m].
+            mass: Of the fibre in the coil, from which ``fibre.line_density`` follows; None keeps
+                what the fibre has [kg].
+            breaking_force: Tension at which it breaks; None if that is not known [N].
+            heat_loss: As in ``TcaSpec``; None for ``still_air_loss``, an estimate [W/(m K)].
+            plies: If it has several strands. Lengths, resistance, mass and breaking force are then
+                those of all together; diameter, coils, thickness and fibre length those of each.
+
+        Raises:
+            ValueError: If a number is out of range, as in millimetres or grams, if not two of the
+                three are given, or they are no coil.
+        """
+        given = {"fibre_length": fibre_length, "outer_diameter": outer_diameter, "coils": coils}
+        known = [name for name, value in given.items() if value is not None]
+        if len(known) != 2:
+            raise ValueError(f"two of {list(given)} must be given, got {known}")
+        strands, lay = (1, 0.0) if plies is None else (plies.strands, plies.lay_angle)
+        along = rest_length / math.cos(lay)
+        half = fibre.radius if thickness is None else 0.5 * thickness
+        if fibre_length is not None:
+            number("rest_length", rest_length, below=fibre_length * math.cos(lay), unit="m")
+        if outer_diameter is not None:
+            radius = number("outer_diameter", outer_diameter, above=2.0 * half) / 2.0 - half
+        elif fibre_length is not None and coils is not None:
+            radius = math.sqrt(fibre_length**2 - along**2) / (2.0 * math.pi * coils)
+        if fibre_length is None and coils is not None:
+            fibre_length = math.hypot(along, 2.0 * math.pi * radius * coils)
+        assert fibre_length is not None
+        touching = _closest(radius, half)
+        if contact_length is not None:
+            number("contact_length", contact_length, below=rest_length, unit="m, the rest_length")
+            wound = along * math.sin(lay)
+            touching = math.asin(min(math.hypot(contact_length, wound) / fibre_length, 1.0))
+        if mass is not None:
+            fibre = replace(fibre, line_density=mass / (strands * fibre_length))
+        return cls(
+            fibre=fibre, fibre_length=fibre_length, coil_radius=radius,
+            pitch_angle=math.asin(along / fibre_length), minimum_pitch_angle=touching,
+            breaking_force=breaking_force and breaking_force / (strands * math.cos(lay)),
+            resistance_per_length=strands * resistance / along,
+            heat_loss=still_air_loss(fibre) if heat_loss is None else heat_loss, plies=plies,
+        )  # fmt: skip
 
     @classmethod
     @door
@@ -215,26 +323,36 @@ class TcaSpec(Checked):
         cls,
         *,
         fibre: FibreSpec,
-        fibre_length: float,
-        core_diameter: float,
-        groove_pitch_angle: float,
+        fibre_length: Annotated[float, _length],
+        core_diameter: Annotated[float, _coil],
+        groove_pitch_angle: Annotated[float, _pitch],
+        resistance_per_length: Positive,
         annealing_temperature: float | None = None,
+        rest_length: Annotated[float, _length] | None = None,
         minimum_pitch_angle: float | None = None,
+        breaking_force: Positive | None = None,
+        heat_loss: Positive | None = None,
     ) -> TcaSpec:
         """A TCA from its making: fibre in a helical groove, annealed; Sun, Section 2.1.1.
 
         The made length is fibre_length sin(groove pitch), the radius on the mandrel is (core +
-        fibre diameter)/2. Off it the coil keeps its turns and creeps to its natural length,
-        contact length + ``kept_share`` (made length - contact length).
+        fibre diameter)/2. Off it the coil keeps its turns and creeps to its natural length. That is
+        *predicted*, contact length + ``kept_share`` (made length - contact length), by a rule that
+        was fitted to two TCAs of one thread: on another it has been off by 15 %. Whoever has the
+        TCA measures it and gives ``rest_length``, or takes ``from_measured``.
 
         Args:
             fibre: The twisted fibre.
             fibre_length: Its length in the coil [m].
             core_diameter: Diameter of the mandrel's core, the coil's inner diameter [m].
             groove_pitch_angle: Pitch angle of the groove, alpha_m [rad].
+            resistance_per_length: As in ``TcaSpec`` [ohm/m].
             annealing_temperature: Temperature of the oven [°C]; None for the coil as made.
+            rest_length: Natural length as measured, in place of the predicted one [m].
             minimum_pitch_angle: Pitch angle at which the coils touch; None is close packing,
                 asin(r_t/(pi r)), 8.4° in Table 2.1, where real threads touch at 11.53° [rad].
+            breaking_force: As in ``TcaSpec`` [N].
+            heat_loss: As in ``TcaSpec``; None for ``still_air_loss``, an estimate [W/(m K)].
 
         Returns:
             The TCA at its natural length, other numbers at their defaults.
@@ -243,12 +361,9 @@ class TcaSpec(Checked):
             ValueError: If a number is out of range, as in millimetres or degrees, or the coils
                 touch (annealed too cold).
         """
-        _length("fibre_length", fibre_length)
-        _coil("core_diameter", core_diameter)
-        _pitch("groove_pitch_angle", groove_pitch_angle)
         radius = 0.5 * core_diameter + fibre.radius
         if minimum_pitch_angle is None:
-            minimum_pitch_angle = math.asin(fibre.radius / (math.pi * radius))
+            minimum_pitch_angle = _closest(radius, fibre.radius)
         angle("minimum_pitch_angle", minimum_pitch_angle, below=groove_pitch_angle)
         kept = 1.0
         if annealing_temperature is not None:
@@ -259,18 +374,45 @@ class TcaSpec(Checked):
         coil = cls(
             fibre=fibre, fibre_length=fibre_length, coil_radius=radius,
             pitch_angle=groove_pitch_angle, minimum_pitch_angle=minimum_pitch_angle,
+            resistance_per_length=resistance_per_length, breaking_force=breaking_force,
+            heat_loss=still_air_loss(fibre) if heat_loss is None else heat_loss,
         )  # fmt: skip
-        return coil.of_pitch(math.asin(contact + kept * (made - contact)))
+        sine = contact + kept * (made - contact)
+        if rest_length is not None:
+            sine = number("rest_length", rest_length, above=contact * fibre_length,
+                          below=fibre_length, unit="m") / fibre_length  # fmt: skip
+        return coil.of_pitch(math.asin(sine))
+
+    @property
+    def strands(self) -> int:
+        """Number of strands."""
+        return 1 if self.plies is None else self.plies.strands
+
+    @property
+    def lay_angle(self) -> float:
+        """Angle between strands and TCA at the natural length, 0 unless it is plied [rad]."""
+        return 0.0 if self.plies is None else self.plies.lay_angle
+
+    @property
+    def strand(self) -> TcaSpec:
+        """One of the strands, alone; the TCA itself if it has but one."""
+        return self if self.plies is None else replace(self, plies=None)
+
+    @property
+    def wound(self) -> float:
+        """How far a strand goes round the TCA's axis, w; 0 unless it is plied [m]."""
+        return self.fibre_length * math.sin(self.pitch_angle) * math.sin(self.lay_angle)
 
     @property
     def rest_length(self) -> float:
-        """Natural length l_t sin(alpha*): no load, reference temperature [m]."""
-        return self.fibre_length * math.sin(self.pitch_angle)
+        """Natural length, l_t sin(alpha*) of one strand: no load, reference temperature [m]."""
+        return self.fibre_length * math.sin(self.pitch_angle) * math.cos(self.lay_angle)
 
     @property
     def minimum_length(self) -> float:
         """Length at which neighbouring coils touch [m]."""
-        return self.fibre_length * math.sin(self.minimum_pitch_angle)
+        touching, wound = self.fibre_length * math.sin(self.minimum_pitch_angle), self.wound
+        return touching if wound == 0.0 else math.sqrt(touching**2 - wound**2)
 
     @property
     def free_stroke(self) -> float:
@@ -279,30 +421,41 @@ class TcaSpec(Checked):
 
     @property
     def winding(self) -> float:
-        """Angle W about the coil's axis per fibre length, cos(alpha*)/r* [rad/m]."""
+        """Angle W about a coil's axis per fibre length, cos(alpha*)/r* [rad/m]."""
         return math.cos(self.pitch_angle) / self.coil_radius
 
     @property
     def coils(self) -> float:
-        """Number of coils."""
+        """Number of coils of a strand."""
         return self.winding * self.fibre_length / (2.0 * math.pi)
 
     @property
     def outer_radius(self) -> float:
-        """Radius of the coil's outer surface [m]."""
-        return self.coil_radius + self.fibre.radius
+        """Radius of the outer surface; of several strands in a ring in which they touch [m]."""
+        coil = self.coil_radius + self.fibre.radius
+        return coil if self.plies is None else coil * (1.0 + 1.0 / math.sin(math.pi / self.strands))
+
+    @property
+    def breaking_tension(self) -> float:
+        """Tension at which it breaks, infinite where that is not known [N].
+
+        Strands break together; wound ones lie straighter when they are stretched, and hold more.
+        """
+        if self.breaking_force is None:
+            return math.inf
+        return self.breaking_force * self.strands * math.cos(self.lay_angle)
 
     @property
     def mass(self) -> float:
-        """Mass of the fibre, without a body [kg]."""
-        return self.fibre.line_density * self.fibre_length
+        """Mass of the fibre of all strands, without a body [kg]."""
+        return self.fibre.line_density * self.fibre_length * self.strands
 
     @property
     def heat(self) -> HeatSpec:
         """Lumped thermal constants, Sun, eq. (3.1); in a body all heat goes through that."""
         capacity, length, body = self.mass * self.fibre.specific_heat, self.rest_length, self.body
         if body is None:
-            loss = self.heat_loss * self.fibre_length
+            loss = self.heat_loss * self.fibre_length * self.strands
             return HeatSpec(capacity=capacity, loss=loss, ambient=self.ambient)
         return HeatSpec(
             capacity=capacity, loss=0.0, ambient=self.ambient,
@@ -320,11 +473,39 @@ class TcaSpec(Checked):
     def of_pitch(self, pitch_angle: float) -> TcaSpec:
         """The same coil crept to another natural pitch angle [rad]; it keeps its turns.
 
-        The coil's radius follows, cos(pitch)/winding; the contact length stays.
+        The coil's radius follows, cos(pitch)/winding; the contact length stays, and how far strands
+        are wound.
         """
         _pitch("pitch_angle", pitch_angle)
-        radius = math.cos(pitch_angle) / self.winding
-        return replace(self, pitch_angle=pitch_angle, coil_radius=radius)
+        radius, plies = math.cos(pitch_angle) / self.winding, self.plies
+        if plies is not None and plies.lay_angle:
+            sine = self.wound / (self.fibre_length * math.sin(pitch_angle))
+            plies = replace(plies, lay_angle=math.asin(min(sine, 1.0)))
+        return replace(self, pitch_angle=pitch_angle, coil_radius=radius, plies=plies)
+
+
+@door
+def still_air_loss(fibre: FibreSpec) -> float:
+    """Heat lost to still air by a thread of which it was not measured [W/(m K)].
+
+    By the circumference of its circle, h c_s 2 pi r_t with h = 23 W/(m² K) and c_s = 2.5, which
+    were identified on one silver-coated thread (Sun, Table 3.1 and Section 3.1.1). Of another
+    thread it is an estimate, good to a factor of two: a smooth one has less surface.
+
+    Args:
+        fibre: The thread.
+    """
+    return 23.0 * 2.5 * 2.0 * math.pi * fibre.radius
+
+
+def _closest(coil: float, fibre: float) -> float:
+    """Pitch angle of coils that touch, of the radii of coil and fibre: close packing [rad].
+
+    Raises:
+        ValueError: If it is none: the coil is thinner than the fibre.
+    """
+    number("radius of the coil", coil, above=fibre / math.pi, unit="m")
+    return math.asin(fibre / (math.pi * coil))
 
 
 def heat_of(specs: Sequence[TcaSpec]) -> HeatSpec:

@@ -12,7 +12,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from tca_mj.checks import Array
-from tca_mj.tca import CATALOGUE, FibreSpec, LoadedTcas, TcaSpec, hanging_length
+from tca_mj.tca import CATALOGUE, LoadedTcas, TcaSpec, hanging_length
 from tca_mj.tca.dynamics.loads import GRAVITY, Course, Heating
 from tca_mj.tca.laws.creep import CreepBank, CreepState
 from tca_mj.validation.facts import Finding, finding, words
@@ -94,6 +94,7 @@ def made_from_mandrel(name: str) -> TcaSpec:
         fibre=replace(CATALOGUE[name].fibre, radius=THICKNESS / 2.0), fibre_length=0.350,
         core_diameter=0.405e-3, groove_pitch_angle=math.asin(made / 350.0),
         annealing_temperature=annealed, minimum_pitch_angle=math.radians(11.53),
+        resistance_per_length=CATALOGUE[name].resistance_per_length,
     )  # fmt: skip
 
 
@@ -174,7 +175,7 @@ class Choice(NamedTuple):
 
 
 _LOADED = CATALOGUE["free-stroke"].fibre.load_softening
-_RADII = (THICKNESS / 2.0, FibreSpec().radius)  # Tables 2.1 and 3.1
+_RADII = (THICKNESS / 2.0, CATALOGUE["free-stroke"].fibre.radius)  # Tables 2.1 and 3.1
 
 
 class Scan(NamedTuple):
@@ -253,7 +254,7 @@ def loaded_stroke() -> list[Finding]:
         finding("loaded-stroke", 100.0 * float(1.0 - hot / cold), annealed=annealed, meets=meets,
                 touching=100.0 * (1.0 - tca.minimum_length / float(cold)), bare=bare,
                 data=100.0 * float(1.0 - data / cold)),
-        finding("breaking-force", tca.breaking_force),
+        finding("breaking-force", tca.breaking_tension),
     ]  # fmt: skip
 
 

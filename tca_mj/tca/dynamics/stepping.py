@@ -40,6 +40,7 @@ from tca_mj.checks import (
 )
 from tca_mj.tca.arrays import column, stacked
 from tca_mj.tca.dynamics.loads import Course, Heating, Load, LoadState
+from tca_mj.tca.laws.plies import law_of
 from tca_mj.tca.laws.rod import CoilRods, require_domain
 from tca_mj.tca.sensing import wire
 from tca_mj.tca.spec import TcaSpec, heat_of
@@ -116,8 +117,8 @@ class LoadedTcas:
         """
         self.specs = tuple(specs)
         self.load = load
-        rods = CoilRods(self.specs)
-        self.n = rods.n
+        rods = law_of(self.specs, CoilRods)
+        self.n = len(self.specs)
         self.shortest, self.longest = rods.shortest, rods.longest
         self._law: LengthLaw = rods.tension if law is None else law
         self._resistance = resistance or partial(wire.resistance, wire.WireTable.of(self.specs))

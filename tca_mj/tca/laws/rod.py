@@ -110,11 +110,15 @@ class CoilRods:
             specs: The n TCAs.
 
         Raises:
-            ValueError: If ``specs`` is empty.
+            ValueError: If ``specs`` is empty, or one has several strands: ``plies.law_of`` joins
+                the law of its ``strand``, as banks do.
         """
         self.n = len(specs)
         if self.n == 0:
             raise ValueError("specs must hold at least 1 TCA, got none")
+        for spec in specs:
+            if spec.plies is not None:
+                raise ValueError(f"specs must be single coils (TcaSpec.strand), got {spec.plies}")
         fibres = [spec.fibre for spec in specs]
         self._fibres = FibreTable.of(fibres)
         self._hot = np.array([fibre.section == "hot" for fibre in fibres])
@@ -297,7 +301,8 @@ def coil_tension(spec: TcaSpec, length: ArrayLike, temperature: ArrayLike) -> tu
 
     Raises:
         ValueError: If a length is outside half of the minimum length to 98 % of the fibre length,
-            or a temperature leaves no modulus.
+            or a temperature leaves no modulus; or if it has several strands, which ``tension``
+            takes.
         CoilSolveError: If the shape is not found.
     """
     length, temperature = np.broadcast_arrays(

@@ -26,8 +26,9 @@ the laws extrapolate.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
-from typing import get_args
+from typing import Any, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -45,9 +46,15 @@ from tca_mj.checks import (
 from tca_mj.tca.laws.castigliano import Scheme
 from tca_mj.tca.laws.coil import Spin
 from tca_mj.tca.laws.model import CoilModel, Model
+from tca_mj.tca.laws.plies import across, along, joined
+from tca_mj.tca.laws.roots import CoilSolveError
 from tca_mj.tca.spec import TcaSpec
 
+Ends = tuple[float, float]
 _CHUNK = 4096  # elements solved at a time: what fits into a processor's cache
+# Of wound strands the load sets the angle and the angle their share of it: how often that is tried,
+# and by how much its cosine may still change.
+_TURNS, _SETTLED = 100, 1e-13
 
 
 @door
@@ -81,7 +88,19 @@ def hanging_length(
         spin = "locked" if model == "love" else "free"
     problem = _checked_model(tca, model, spin, scheme)
     load = within("load", load, at_least=0.0, unit="N")
-    (length,) = _in_chunks(lambda *each: (problem.hang(*each),), _checked(tca, temperature), load)
+
+    def hang(temperature: Array, load: Array) -> tuple[Array]:
+        each, share, off = load / tca.strands, np.array(math.cos(tca.lay_angle)), math.inf
+        for _ in range(_TURNS):
+            strand = problem.hang(temperature, each / share)
+            length = across(strand, tca.wound)
+            off = float(np.max(np.abs(length / strand - share), initial=0.0))
+            if tca.wound == 0.0 or off <= _SETTLED:
+                return (length,)
+            share = length / strand
+        raise CoilSolveError(off)
+
+    (length,) = _in_chunks(hang, _checked(tca, temperature), load)
     return length
 
 
@@ -118,10 +137,9 @@ def tension(
             leaves no modulus or no helix; if a name is unknown.
         CoilSolveError: If the shape is not found.
     """
-    problem = _checked_model(tca, model, spin, scheme)
-    shortest, longest = problem.domain
+    law, (shortest, longest) = _law(tca, _checked_model(tca, model, spin, scheme))
     length = within("length", length, at_least=shortest, at_most=longest, unit="m")
-    force, stiffness = _in_chunks(problem.tension, length, _checked(tca, temperature))
+    force, stiffness = _in_chunks(law, length, _checked(tca, temperature))
     return force, stiffness
 
 
@@ -200,10 +218,9 @@ def law_at(
         >>> print(f"{force:.3f} N, {slope:.1f} N/m")
         0.354 N, 20.0 N/m
     """
-    problem = _checked_model(tca, model, spin, scheme)
-    shortest, longest = problem.domain
+    pull, (shortest, longest) = _law(tca, _checked_model(tca, model, spin, scheme))
     hot = _checked(tca, temperature, ())
-    pressed, _ = problem.tension(np.array([shortest]), hot[None])
+    pressed, _ = pull(np.array([shortest]), hot[None])
     if pressed[0] > 0.0:
         raise ValueError(
             f"contact_ratio must be larger for {temperature} °C, where the coils pull with"
@@ -213,7 +230,7 @@ def law_at(
     def law(length: ArrayLike) -> tuple[Array, Array]:
         length = within("length", length, at_least=0.0, at_most=longest, unit="m")
         inside = np.maximum(length.ravel(), shortest)
-        force, slope = problem.tension(inside, np.broadcast_to(hot, inside.shape))
+        force, slope = pull(inside, np.broadcast_to(hot, inside.shape))
         taut = (force > 0.0).reshape(length.shape)
         force, slope = force.reshape(length.shape), slope.reshape(length.shape)
         return np.where(taut, force, 0.0)[()], np.where(taut, slope, 0.0)[()]
@@ -225,7 +242,22 @@ def _checked_model(tca: TcaSpec, model: Model, spin: Spin, scheme: Scheme) -> Co
     require_one_of("model", model, get_args(Model))
     require_one_of("spin", spin, get_args(Spin))
     require_one_of("scheme", scheme, get_args(Scheme))
-    return CoilModel.of(tca, model, spin, scheme)
+    return CoilModel.of(tca.strand, model, spin, scheme)
+
+
+def _law(tca: TcaSpec, problem: CoilModel) -> tuple[Callable[[Array, Array], Any], Ends]:
+    """Tension and slope of a TCA by the model of its strands, and between which lengths."""
+    if tca.plies is None:
+        return problem.tension, problem.domain
+    wound, (shortest, longest) = tca.wound, problem.domain
+
+    def law(length: Array, temperature: Array) -> tuple[Array, Array]:
+        strand = along(length, wound)
+        inside = np.clip(strand, shortest, longest)  # but for rounding
+        return joined(length, strand, *problem.tension(inside, temperature), tca.strands)
+
+    ends = across(np.maximum(problem.domain, wound), wound)
+    return law, (float(ends[0]), float(ends[1]))
 
 
 def _checked(tca: TcaSpec, temperature: ArrayLike, shape: tuple[int, ...] | None = None) -> Array:

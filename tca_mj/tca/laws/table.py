@@ -127,7 +127,7 @@ def calibrate(tca: TcaSpec) -> Surface:
     """The surface of a TCA's coil, made once.
 
     Args:
-        tca: The TCA. Its length, heat, resistance, strength and contact do not matter.
+        tca: The TCA. Its length, heat, resistance, strength, contact and strands do not matter.
 
     Raises:
         CalibrationError: If no table follows the rod within 0.1 mN and 0.2 %, or the rod's own
@@ -183,7 +183,7 @@ def coil_alone(tca: TcaSpec) -> TcaSpec:
         fibre=replace(tca.fibre, line_density=1e-4, specific_heat=1.0),
         fibre_length=1.0, breaking_force=1.0, resistance_per_length=1.0, stretch_resistance=0.0,
         contraction_resistance=0.0, heat_loss=1.0, ambient=25.0, body=None,
-        contact_ratio=1.0, contact_smoothing=0.5,
+        contact_ratio=1.0, contact_smoothing=0.5, plies=None,
     )  # fmt: skip
 
 

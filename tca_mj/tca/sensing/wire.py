@@ -64,11 +64,16 @@ class WireTable(NamedTuple):
     @classmethod
     @door
     def of(cls, specs: Sequence[TcaSpec]) -> WireTable:
-        """Collects the numbers of ``specs``, in their order."""
-        rest_length = column(specs, "rest_length")
+        """Collects the numbers of ``specs``, in their order.
+
+        Strands conduct side by side. Those that stand at an angle are longer than the TCA and
+        strained less, by the square of its cosine: to first order in the strain.
+        """
+        rest_length, cos = column(specs, "rest_length"), np.cos(column(specs, "lay_angle"))
+        strand = column(specs, "resistance_per_length") / (cos * column(specs, "strands"))
         return cls(
-            rest_length, rest_length * column(specs, "resistance_per_length"),
-            column(specs, "stretch_resistance"), column(specs, "contraction_resistance"),
+            rest_length, rest_length * strand, cos * cos * column(specs, "stretch_resistance"),
+            cos * cos * column(specs, "contraction_resistance"),
         )  # fmt: skip
 
 
