@@ -9,7 +9,7 @@ from typing import Any
 from tca_mj.checks import door, number, shown, whole
 from tca_mj.hints import nearest
 from tca_mj.registry import task_class
-from tca_mj.tca import CATALOGUE, TcaSpec
+from tca_mj.tca import TcaSpec, find_tca
 
 
 @door
@@ -18,8 +18,8 @@ def robot_of(task: str, design: Mapping[str, Any]) -> dict[str, Any]:
 
     Args:
         task: Gymnasium id.
-        design: Values by path. A TCA (``leg.tca``) takes the name of a catalogue's entry; its
-            ``pitch_angle`` [rad] changes the coil at the same thread (``TcaSpec.of_pitch``).
+        design: Values by path. A TCA (``leg.tca``) takes the name of a catalogue's entry or a file;
+            its ``pitch_angle`` [rad] changes the coil at the same thread (``TcaSpec.of_pitch``).
 
     Raises:
         ValueError: If the task has no such robot, there is no such figure, or the value cannot be.
@@ -61,12 +61,10 @@ def _changed(spec: Any, path: str, design: str, value: Any) -> Any:
     if rest:
         return replace(spec, **{name: _changed(now, rest, design, value)})
     if isinstance(now, TcaSpec):
-        if not isinstance(value, str) or value not in CATALOGUE:
-            raise ValueError(
-                f"{design} must be one of {list(CATALOGUE)}, got {shown(value)}"
-                f"{nearest(value, CATALOGUE)}"
-            )
-        return replace(spec, **{name: CATALOGUE[value]})
+        try:
+            return replace(spec, **{name: find_tca(value)})
+        except (OSError, ValueError) as error:
+            raise ValueError(f"{design}: {error}") from error
     if isinstance(now, float):
         value = number(design, value)
     elif isinstance(now, int) and not isinstance(now, bool):

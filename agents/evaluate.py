@@ -36,6 +36,7 @@ from tca_mj.machine import machine, versions
 from tca_mj.pages import table, write_result
 from tca_mj.registry import EpisodeSteps, episode_steps, make, task_class
 from tca_mj.sim import Timestep
+from tca_mj.tca import find_tca
 
 REPORT = "summary.md"
 _Real = Annotated[float, number]  # also one that is 0 but for rounding
@@ -78,7 +79,7 @@ class Evaluation(Checked):
         design: Figures of the robot that differ from the default, see
             ``tca_mj.agents.design.robot_of``.
         arguments: What the task is made with, on top of what the policy's file says: ``action``,
-            ``control_period``.
+            ``control_period``, ``tca``.
         preprocessing: What became of the observations of a model of Stable-Baselines3.
         options: Options of every reset besides ``randomise``.
 
@@ -121,6 +122,12 @@ class Evaluation(Checked):
         ):  # fmt: skip
             if getattr(self, name) == usual:
                 del settings[name]
+        for made in ("arguments", "design"):  # a file is what it holds
+            if made in settings:
+                settings[made] = {
+                    name: repr(find_tca(value)) if str(value).endswith(".json") else value
+                    for name, value in settings[made].items()
+                }  # fmt: skip
         if self.policy not in NAMES:
             content = b"" if called(self.policy) else find(self.policy).read_bytes()
             settings["policy"] = self.policy if not content else hashlib.sha256(content).hexdigest()

@@ -195,7 +195,7 @@ class AdaptiveGrasp(SimulatedTask):
         """
         own = type(self).control_period
         parts("timestep", own, timestep)
-        self.gripper_spec = gripper_spec or AdaptiveGripperSpec()
+        self.gripper_spec = self._robot(gripper_spec, common)
         sim = Simulation(_scene(self.gripper_spec), timestep=timestep, tca_period=own)
         longest = float(sim.bank.longest.max())
         size = self.gripper_spec.lift.travel[1] + longest

@@ -131,7 +131,7 @@ class ArmPickPlace(SimulatedTask):
             ValueError: If the render mode is unknown or the arm cannot be built.
         """
         parts("timestep", type(self).control_period, timestep, of=5)
-        self.arm_spec = arm_spec or ArmSpec()
+        self.arm_spec = self._robot(arm_spec, common)
         require_one_of("arm_spec.bending.count", self.arm_spec.bending.count, (3,))
         files = ["cup", *(name for kind in OBJECTS for name in (kind, f"{kind}_stand"))]
         part = scene(

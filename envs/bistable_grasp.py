@@ -136,7 +136,7 @@ class BistableGrasp(HeldObject):
             ValueError: If an argument is out of range or the gripper cannot be built.
         """
         parts("timestep", type(self).control_period, timestep, of=20)
-        self.gripper_spec = gripper_spec or BistableGripperSpec()
+        self.gripper_spec = self._robot(gripper_spec, common)
         files = {name: mjcf(f"{name}.xml") for name in ("goal", "weight")}
         part = scene(mjcf("arena.xml"), bistable_gripper(self.gripper_spec), files, name="gripper")
         part.spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC  # what is held must not creep

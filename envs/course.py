@@ -170,7 +170,7 @@ class TetrapodCourse(SimulatedTask):
             ValueError: If an argument is unknown or the robot cannot be built.
         """
         parts("tca_period", type(self).control_period, tca_period)
-        self.robot = robot or _default()
+        self.robot = self._robot(robot, common)
         sim = tetrapod_scene(
             mjcf("course.xml"), {}, self.robot, timestep=timestep, period=tca_period
         )

@@ -157,7 +157,7 @@ class FingerSense(SimulatedTask):
         Raises:
             ValueError: If an argument is unknown or out of range, or the finger cannot be built.
         """
-        self.sensed = SensedFinger(finger_spec, timestep=timestep)
+        self.sensed = SensedFinger(self._robot(finger_spec, common), timestep=timestep)
         self.finger_spec = self.sensed.spec
         most = 3.0 * self.sensed.resistance
         rows = ("resistance", "resistance reading", "lowest resistance")

@@ -131,7 +131,7 @@ class Grasp(HeldObject):
             ValueError: If an argument is out of range or the gripper cannot be built.
         """
         parts("timestep", type(self).control_period, timestep, of=5)
-        self.gripper_spec = gripper_spec or GripperSpec()
+        self.gripper_spec = self._robot(gripper_spec, common)
         files = {name: mjcf(f"{name}.xml") for name in ("tray", "block")}
         part = scene(mjcf("arena.xml"), gripper(self.gripper_spec), files, name="gripper")
         sim = Simulation(part, timestep=timestep, tca_period=5.0 * timestep)

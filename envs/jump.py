@@ -114,7 +114,7 @@ class Jump(SimulatedTask):
         Raises:
             ValueError: If an argument is unknown or out of range, or the robot cannot be built.
         """
-        self.jumper_spec = jumper_spec or JumperSpec()
+        self.jumper_spec = self._robot(jumper_spec, common)
         part = scene(mjcf("jump.xml"), jumper(self.jumper_spec), {})
         sim = Simulation(part, timestep=timestep, tca_period=_PERIOD, haste=haste)
         longest = float(sim.bank.longest.max())

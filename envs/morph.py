@@ -128,7 +128,7 @@ class MorphModule(SimulatedTask):
         """
         own = type(self).control_period
         parts("timestep", own, timestep)
-        self.module_spec = module_spec or _default()
+        self.module_spec = self._robot(module_spec, common)
         part = hanging_module(self.module_spec)
         sim = Simulation(part, timestep=timestep, tca_period=own)
         longest = float(sim.bank.longest.max())

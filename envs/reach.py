@@ -126,7 +126,7 @@ class BendReach(SimulatedTask):
         Raises:
             ValueError: If an argument is unknown or out of range, or the module cannot be built.
         """
-        self.module_spec = module_spec or BendingSpec()
+        self.module_spec = self._robot(module_spec, common)
         self.static = StaticTip(self.module_spec, timestep=timestep)
         longest = float(self.static.sim.bank.longest.max())
         size = max(longest, 1.5 * self.module_spec.length)

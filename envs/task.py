@@ -7,6 +7,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from copy import deepcopy
 from dataclasses import asdict
+from pathlib import Path
 from typing import Any, ClassVar, TypedDict, Unpack
 
 import gymnasium as gym
@@ -36,14 +37,14 @@ from tca_mj.record.render import Offscreen, Pixels, colour_tendons
 from tca_mj.registry import ControlPeriod
 from tca_mj.sim import Drive, Simulation, SimulationDiverged, Timestep
 from tca_mj.state import get_state, set_state
-from tca_mj.tca import HeatSpec, Supply, Thermostat
+from tca_mj.tca import HeatSpec, Supply, TcaSpec, Thermostat, with_tca
 from tca_mj.variation import AMBIENT, Nominal, Variation
 
 # What of a task may change in an episode has one of these types; and what never does, by name.
 _VALUES = (bool, int, float, str, tuple, dict, np.ndarray, np.generic)
 _BUILT = (
     "render_mode", "_camera", "_size", "spec", "metadata",
-    "heating", "control_period", "interval", "repeats", "share", "_off", "_half_range",
+    "heating", "control_period", "interval", "repeats", "share", "_off", "_half_range", "_own_tca",
 )  # fmt: skip
 _DAMAGE = frozenset(("TCA temperature", "TCA tension"))  # rows that are out of bounds by damage
 HEATINGS = ("temperature", "power")  # what a number of an action means to a TCA
@@ -59,6 +60,9 @@ class TaskArguments(TypedDict, total=False):
         render_mode: None or ``"rgb_array"``.
         camera: Camera of the pictures, one of the class's ``cameras``; by default the first.
         size: Width and height of the pictures, 1 to 8192, by default 960 by 720 [pixels].
+        tca: The muscle of the robot in place of its own: a TCA, its name in ``CATALOGUE`` or its
+            file, see ``tca_mj.tca.with_tca``. It is cut to its routes and laid into silicone as
+            the robot's own; the robot has to get through its first step with it.
     """
 
     action: str
@@ -66,6 +70,7 @@ class TaskArguments(TypedDict, total=False):
     render_mode: str | None
     camera: str
     size: tuple[int, int]
+    tca: TcaSpec | str | Path | None
 
 
 class SimulatedTask(gym.Env[Observation, Action], ABC):
@@ -177,6 +182,7 @@ class SimulatedTask(gym.Env[Observation, Action], ABC):
     _camera: str
     _size: tuple[int, int]
     _screen: Offscreen | None = None
+    _own_tca: bool = False
     _off: NDArray[np.float64]
     _half_range: float | NDArray[np.float64]
 
@@ -199,8 +205,8 @@ class SimulatedTask(gym.Env[Observation, Action], ABC):
         kind = type(self)
         if kind.scene is None:
             raise ValueError(f"scene must be what builds the robot of {kind.__name__}, got None")
-        if spec is None and kind.robot_argument is not None:
-            spec = kind.robot_argument[1]()
+        if kind.robot_argument is not None:
+            spec = self._robot(spec, common)
         part = kind.scene(spec)
         sim = Simulation(part, timestep=timestep, tca_period=kind.control_period)
         heating = Entry("TCA heating", sim.n, -1.0, 1.0, "-", off=-1.0)
@@ -220,6 +226,7 @@ class SimulatedTask(gym.Env[Observation, Action], ABC):
         render_mode: str | None = None,
         camera: str | None = None,
         size: tuple[Pixels, Pixels] = (960, 720),
+        tca: TcaSpec | str | Path | None = None,
     ) -> None:
         """Takes what the task is made of, and ``TaskArguments``; to be called once by ``__init__``.
 
@@ -227,6 +234,8 @@ class SimulatedTask(gym.Env[Observation, Action], ABC):
             ValueError: If an argument is unknown or out of range, or the control period no multiple
                 of the time between two updates of the TCAs.
         """
+        if tca is not None:  # ``_robot`` would have taken it
+            raise ValueError(f"tca must be None for {type(self).__name__}, got {shown(tca)}")
         require_one_of("render_mode", render_mode, (None, *self.metadata["render_modes"]))
         require_one_of("camera", camera, (None, *self.cameras))
         self.render_mode, self._size = render_mode, size
@@ -374,11 +383,28 @@ class SimulatedTask(gym.Env[Observation, Action], ABC):
         self._used = self.energy
         return self.seen(), self._info(success=False)
 
+    def _robot(self, given: Any, common: TaskArguments) -> Any:
+        """The specification of the robot: the one given, or where that is None the default one.
+
+        To be called by ``__init__`` at its start. It takes the argument ``tca`` out of ``common``.
+
+        Raises:
+            ValueError: If there is no such TCA.
+            FileNotFoundError: If its file is not there.
+        """
+        assert self.robot_argument is not None
+        robot = self.robot_argument[1]() if given is None else given
+        tca = common.pop("tca", None)
+        self._own_tca = tca is not None
+        return robot if tca is None else with_tca(robot, tca)
+
     def _try(self, name: str, robot: Any) -> None:
         """Refuses a robot that was given, not None, if it does not get through its first step.
 
         To be called by ``__init__`` at its end.
         """
+        if self._own_tca:
+            robot = getattr(self, name)
         if robot is None:
             return
         try:

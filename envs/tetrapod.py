@@ -149,7 +149,7 @@ class TetrapodGait(SimulatedTask):
         """
         self.gait = require_one_of("gait", gait, list(TASKS))
         self.task = TASKS[gait]
-        self.robot = robot or TetrapodSpec()
+        self.robot = self._robot(robot, common)
         objects = {} if self.task.beam is None else {"beam": mjcf("beam.xml")}
         sim = tetrapod_scene(
             mjcf("ground.xml"),

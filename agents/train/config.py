@@ -124,7 +124,7 @@ class TrainConfig(Checked):
         seed: Seed of everything that is drawn, below 2**32.
         envs: Environments that are stepped together, up to 1024.
         options: Options of every reset, in training and in evaluation.
-        arguments: What the task is made with: ``action``, ``control_period``.
+        arguments: What the task is made with: ``action``, ``control_period``, ``tca``.
         timestep: Physics time step in training; None for the task's own, which evaluations have in
             any case [s].
         scaled: Whether observations are scaled by the task's table; otherwise they and the rewards

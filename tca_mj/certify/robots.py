@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from importlib import import_module
 from itertools import combinations
@@ -25,6 +25,7 @@ from tca_mj.checks import Array, Count, Positive, Temperature, door, within
 from tca_mj.machine import machine, versions
 from tca_mj.model.chain import MOTIONS
 from tca_mj.model.part import Part
+from tca_mj.tca import TcaSpec, find_tca
 
 HOT = 120.0  # temperature of a hot TCA [°C]
 COLD = 25.0  # of a cold one [°C]
@@ -54,7 +55,8 @@ Answer: TypeAlias = tuple[Asked, Outcome, bool]
 @door
 def certify_robot(
     robot: Part | str, *, hot: ArrayLike = HOT, gravity: ArrayLike | None = None,
-    spine: Temperature | None = None, nodes: Count | None = None, position: Positive = POSITION,
+    spine: Temperature | None = None, nodes: Count | None = None,
+    tca: TcaSpec | str | Path | None = None, position: Positive = POSITION,
     rotation: Positive = ROTATION, out: Path | None = None, workers: Count = 1,
 ) -> dict[str, Any]:  # fmt: skip
     """Compares a part at rest with the theory of rods: cold, each TCA hot, each two, and all.
@@ -68,6 +70,7 @@ def certify_robot(
         spine: Temperature of its shape-memory spines, which stay at it in their memorised shape;
             None if it has none [°C].
         nodes: Argument ``nodes`` of the function that builds it; None for its own.
+        tca: Its argument ``tca``, what ``find_tca`` finds; None for its own.
         position: Bound of the error of place of every chain's end, over the length of the chains on
             the way there [1].
         rotation: Bound of the error of its frame [rad].
@@ -82,9 +85,11 @@ def certify_robot(
         ValueError: If an argument is out of range, there is no such function, or theory does not
             cover the part; the message names the part and the body.
     """
-    part = robot if isinstance(robot, Part) else built(robot, nodes)
-    if nodes is not None and isinstance(robot, Part):
-        raise ValueError(f"nodes must be None where robot is a Part, got {nodes}")
+    given = {"nodes": nodes, "tca": None if tca is None else find_tca(tca)}
+    given = {name: value for name, value in given.items() if value is not None}
+    if given and isinstance(robot, Part):
+        raise ValueError(f"{next(iter(given))} must be None where robot is a Part, got {given}")
+    part = robot if isinstance(robot, Part) else built(robot, **given)
     names = [tca.name for tca in part.tcas]
     warm = within("hot", hot, above=COLD, unit="°C")
     if warm.shape not in ((), (len(names),)):
@@ -94,7 +99,7 @@ def certify_robot(
     _subject(part, spine)  # refuses what theory does not cover
     asked = list(_asked(names, down))
     begin = time.perf_counter()
-    job = robot, nodes, np.broadcast_to(warm, len(names)), spine
+    job = robot, given, np.broadcast_to(warm, len(names)), spine
     found: dict[int, Outcome] = {}
     with (
         Workers(workers if isinstance(robot, str) else 1) as processes,
@@ -119,12 +124,12 @@ def certify_robot(
     return result | {"text": report(part, _shown(answered), result)}
 
 
-def built(text: str, nodes: int | None = None) -> Part:
+def built(text: str, **given: Any) -> Part:
     """What a function builds.
 
     Args:
         text: ``module:function``.
-        nodes: Its argument ``nodes``; None to leave it out.
+        **given: Its arguments.
 
     Raises:
         ValueError: If there is no such function, it cannot be called so, or builds no part.
@@ -135,9 +140,9 @@ def built(text: str, nodes: int | None = None) -> Part:
     except (ImportError, AttributeError, ValueError) as error:
         raise ValueError(f"robot must be module:function, got {text!r}: {error}") from error
     try:
-        part = build() if nodes is None else build(nodes=nodes)
+        part = build(**given)
     except TypeError as error:
-        how = "without arguments" if nodes is None else "with the argument nodes"
+        how = f"with the argument {' and '.join(given)}" if given else "without arguments"
         raise ValueError(
             f"robot must be a function that is called {how}, got {text!r}: {error}"
         ) from error
@@ -167,10 +172,10 @@ def _asked(names: Sequence[str], gravity: Array) -> Iterator[Asked]:
 
 
 def _answer(
-    robot: Part | str, nodes: int | None, hot: Array, spine: float | None, asked: Asked
+    robot: Part | str, given: Mapping[str, Any], hot: Array, spine: float | None, asked: Asked
 ) -> Outcome:
     """The answer to one case."""
-    part = robot if isinstance(robot, Part) else built(robot, nodes)
+    part = robot if isinstance(robot, Part) else built(robot, **given)
     subject = _subject(part, spine)
     warm = np.array([tca.name in asked.hot for tca in part.tcas])
     still = np.zeros((len(subject.tips), 3))

@@ -58,8 +58,10 @@ def add(parser: argparse._ActionsContainer, name: str, help: str, **more: Any) -
     parser.add_argument(name, help=help, **{**_KINDS.get(name, {}), **more})
 
 
-def add_how_trained(parser: argparse.ArgumentParser) -> None:
-    """Adds what a policy's file says and a model of Stable-Baselines3 (.zip) does not."""
+def add_how_made(parser: argparse.ArgumentParser) -> None:
+    """Adds the robot's muscle, and what a policy's file says of its task but a .zip does not."""
+    add(parser, "--tca", "the robot's muscle: a file, as tca_mj.tca.write_tca writes it, or a name"
+        " in tca_mj.CATALOGUE; default: the robot's own")  # fmt: skip
     group = parser.add_argument_group(
         "how a model of Stable-Baselines3 (.zip) was trained",
         "Its file says neither what the task was made with nor how it saw it: say what differs from"
@@ -78,8 +80,8 @@ def add_how_trained(parser: argparse.ArgumentParser) -> None:
         action="store_true")  # fmt: skip
 
 
-def how_trained(arguments: argparse.Namespace) -> dict[str, Any]:
-    """What ``add_how_trained`` has read: ``arguments`` of the task, and ``preprocessing``.
+def how_made(arguments: argparse.Namespace) -> dict[str, Any]:
+    """What ``add_how_made`` has read: ``arguments`` of the task, and ``preprocessing``.
 
     Raises:
         FileNotFoundError: If there are no such statistics.
@@ -87,7 +89,7 @@ def how_trained(arguments: argparse.Namespace) -> dict[str, Any]:
     """
     from tca_mj.agents.policies import Preprocessing, Statistics
 
-    given = {"action": arguments.action, "control_period": arguments.control_period}
+    given = {name: getattr(arguments, name) for name in ("action", "control_period", "tca")}
     path = arguments.normalize
     statistics = None if path is None else Statistics.read(path, trust=arguments.trust)
     return {
@@ -196,5 +198,6 @@ _KINDS: dict[str, dict[str, Any]] = {
     "--task": _TASK,
     "--out": {"type": parse_folder},
     "--seed": {"type": parse_seed, "default": 0},
+    "--tca": {"metavar": "FILE"},
     **{name: {"type": partial(parse_seed, least=1, most=most)} for name, most in _COUNTS.items()},
 }

@@ -40,6 +40,7 @@ def add_commands(commands: Commands) -> None:
     add(robot, "--spine", "temperature at which its shape-memory spines stay", type=parse_number,
         metavar="CELSIUS")  # fmt: skip
     add(robot, "--nodes", "argument of the function; default: its own")
+    add(robot, "--tca", "argument of the function, a muscle: a file or a name in tca_mj.CATALOGUE")
     add(robot, "--tolerance", "of the tip, in %% of the length; default 1", type=above_0,
         metavar="PERCENT")  # fmt: skip
     add(robot, "--angle", "tolerance of the tip's frame; default 2", type=above_0,
@@ -121,7 +122,7 @@ def _certify(arguments: argparse.Namespace) -> int:
     robots = [name for name in arguments.module if ":" in name]
     if robots:
         return _certify_robots(robots, arguments)
-    named = ("hot", "gravity", "spine", "nodes", "tolerance", "angle")
+    named = ("hot", "gravity", "spine", "nodes", "tca", "tolerance", "angle")
     given = [f"--{name}" for name in named if getattr(arguments, name) is not None]
     if given:
         raise ValueError(f"{given[0]} is for a robot, module:function")
@@ -147,6 +148,7 @@ def _certify_robots(robots: list[str], arguments: argparse.Namespace) -> int:
 
     asked = {"hot": arguments.hot and (arguments.hot if arguments.hot[1:] else arguments.hot[0]),
              "gravity": arguments.gravity, "nodes": arguments.nodes, "spine": arguments.spine,
+             "tca": arguments.tca,
              "position": arguments.tolerance and arguments.tolerance / 100.0,
              "rotation": arguments.angle and radians(arguments.angle)}  # fmt: skip
     asked = {name: value for name, value in asked.items() if value is not None}

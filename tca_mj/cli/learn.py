@@ -11,8 +11,8 @@ from tca_mj.cli.arguments import (
     Commands,
     add,
     add_command,
-    add_how_trained,
-    how_trained,
+    add_how_made,
+    how_made,
     parse_axis,
     parse_number,
     parse_option,
@@ -41,7 +41,7 @@ def add_commands(commands: Commands) -> None:
     add(evaluation, "--out", "folder; default runs/eval/TASK-POLICY")
     add(evaluation, "--workers", "processes; default 1", default=1)
     add(evaluation, "--fresh", "forget what the folder holds", action="store_true")
-    add_how_trained(evaluation)
+    add_how_made(evaluation)
 
     train = add_command(commands, "train", _train, help="train a policy", extra="rl")
     add(train, "task", "its id")
@@ -53,6 +53,7 @@ def add_commands(commands: Commands) -> None:
         choices=("temperature", "power"))  # fmt: skip
     add(train, "--control-period", "time of a step [s]; default: by task", type=parse_seconds,
         metavar="SECONDS")  # fmt: skip
+    add(train, "--tca", "the robot's muscle: a file or a name in tca_mj.CATALOGUE; not of cma")
     some = train.add_mutually_exclusive_group()
     add(some, "--seed", "default 0")
     add(some, "--seeds", "runs with seeds 0 to K-1, into OUT/seed_0, ...", metavar="K")
@@ -77,7 +78,7 @@ def add_commands(commands: Commands) -> None:
     add(sweep, "--workers", "trials at a time; default 2", default=2)
     add(sweep, "--address", "of a running Ray cluster; default: one in this machine")
     add(sweep, "--out", "folder; seen by all machines", required=True)
-    add_how_trained(sweep)
+    add_how_made(sweep)
 
 
 def _eval(arguments: argparse.Namespace) -> int:
@@ -108,7 +109,7 @@ def _eval(arguments: argparse.Namespace) -> int:
     settings = ("task", "policy", "episodes", "seed", "randomise", "steps", "model", "timestep")
     given = {key: getattr(arguments, key) for key in settings}
     given["options"] = dict(arguments.options)
-    evaluation = Evaluation(**given, **how_trained(arguments))
+    evaluation = Evaluation(**given, **how_made(arguments))
     arguments.kept.append(f"what was finished is in {out}")
     summary = evaluate(evaluation, out=out, workers=arguments.workers, fresh=arguments.fresh)
     print(f"{report(summary)}\n\n{out / REPORT}")
@@ -157,10 +158,10 @@ def _train(arguments: argparse.Namespace) -> int:
     base = arguments.out or Path("runs/train") / f"{task_name(arguments.task)}-{algorithm}"
     several = range(arguments.seeds) if arguments.seeds else None
     command, cma = _command(arguments), algorithm == "cma"
-    how = ("action", "control_period")
+    how = ("action", "control_period", "tca")
     asked = {name: getattr(arguments, name) for name in how if getattr(arguments, name) is not None}
     if cma and asked:
-        raise ValueError("--action and --control-period are not for --algo cma")
+        raise ValueError("--action, --control-period and --tca are not for --algo cma")
     for seed in several or [arguments.seed]:
         out = base / f"seed_{seed}" if several else base
         arguments.kept[:] = [f"the same command goes on with {out}"]
@@ -191,7 +192,7 @@ def _command(arguments: argparse.Namespace) -> str:
     """The command of a training run, to be noted."""
     words = ["tca-mj", "train", arguments.task]
     left_out = {"seed": bool(arguments.seeds)}
-    for option in ("algo", "steps", "action", "control_period", "envs", "residual", "start",
+    for option in ("algo", "steps", "action", "control_period", "tca", "envs", "residual", "start",
                    "seeds", "seed"):  # fmt: skip
         value = getattr(arguments, option)
         if value is not None and not left_out.get(option):
@@ -233,7 +234,7 @@ def _sweep(arguments: argparse.Namespace) -> int:
 
     if (arguments.policy is None) == (arguments.algo is None):
         raise ValueError("give POLICY or --algo")
-    how = how_trained(arguments)
+    how = how_made(arguments)
     if arguments.algo and how != {"arguments": {}, "preprocessing": Preprocessing()}:
         raise ValueError("how a model was trained is said of POLICY, not with --algo")
     evaluation = Evaluation(

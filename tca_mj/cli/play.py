@@ -12,8 +12,8 @@ from tca_mj.cli.arguments import (
     Commands,
     add,
     add_command,
-    add_how_trained,
-    how_trained,
+    add_how_made,
+    how_made,
     parse_option,
     task_name,
 )
@@ -63,7 +63,7 @@ def add_commands(commands: Commands) -> None:
     add(view, "--policy", f"{', '.join(POLICIES)}, a shipped one, a file or a run",
         default="scripted")  # fmt: skip
     for parser in (demo, view, export):
-        add_how_trained(parser)
+        add_how_made(parser)
     for parser in (demo, view):
         add(parser, "--seed", "of the first episode; default 0")
         add(parser, "--option", "an option of the task's reset; may be given several times",
@@ -95,7 +95,7 @@ def _demo(arguments: argparse.Namespace) -> int:
         raise ValueError("give a demo's name, or --policy and --task")
     demo = DEMOS[arguments.name] if named else None
     task, policy = (demo.task, demo.policy) if demo else (arguments.task, arguments.policy)
-    how = how_trained(arguments)
+    how = how_made(arguments)
     if demo:
         how["arguments"] = {**demo.arguments, **how["arguments"]}
     out = arguments.out or Path("runs/demo") / (arguments.name or task_name(task))
@@ -160,7 +160,7 @@ def _export(arguments: argparse.Namespace) -> int:
     if arguments.onnx or arguments.npz:
         from tca_mj.agents.policies import saved_policy
 
-        policy = saved_policy(arguments.source, arguments.task, **how_trained(arguments))
+        policy = saved_policy(arguments.source, arguments.task, **how_made(arguments))
         print(policy.to_onnx(arguments.onnx) if arguments.onnx else policy.save(arguments.npz))
         return 0
     from tca_mj.record.reader import read, write_csv
@@ -217,7 +217,7 @@ def _view(arguments: argparse.Namespace) -> int:
         return 2
     from tca_mj.agents.policies.actors import actor, arguments_of
 
-    how, policy = how_trained(arguments), arguments.policy
+    how, policy = how_made(arguments), arguments.policy
     env = make(arguments.task, **arguments_of(policy, arguments.task) | how["arguments"])
     found = actor(policy, env, seed=arguments.seed, preprocessing=how["preprocessing"])
     print("space starts and pauses, backspace begins the next episode, F1 lists all keys")

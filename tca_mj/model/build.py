@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from pathlib import Path
 
 import mujoco
 import numpy as np
 
-from tca_mj.checks import Array, door, shown
-from tca_mj.hints import nearest
+from tca_mj.checks import Array, door
 from tca_mj.model.chain import Chain
 from tca_mj.model.part import Part
 from tca_mj.model.tendon import RoutedTca, lay_tca, route_passes
 from tca_mj.routes import AnyRoute
-from tca_mj.tca import CATALOGUE, TcaSpec
+from tca_mj.tca import TcaSpec, find_tca
 
 VIEW = "view"  # the camera of a stage
 _ANGLE = 35.0  # from its lower to its upper edge [deg]
@@ -27,7 +27,7 @@ def add_tca(
     part: Part,
     chain: Chain | Sequence[Chain],
     route: AnyRoute,
-    tca: TcaSpec | str,
+    tca: TcaSpec | str | Path,
     *,
     name: str | None = None,
 ) -> RoutedTca:
@@ -39,7 +39,7 @@ def add_tca(
             which the route runs through as if they were one.
         route: Where it runs: ``Helix`` (with 0 turns a straight line), ``UTurn``, or one of
             ``parallel(...)``.
-        tca: The kind of TCA, or its name in ``CATALOGUE``; its own length does not matter.
+        tca: The kind of TCA, its name in ``CATALOGUE`` or its file; its own length does not matter.
         name: Its name; by default ``tca0``, ``tca1`` and so on.
 
     Returns:
@@ -58,13 +58,8 @@ def add_tca(
         >>> add_tca(part, chain, Helix(3e-3), "free-stroke").path_length
         0.045
     """
-    if isinstance(tca, str):
-        if tca not in CATALOGUE:
-            raise ValueError(
-                f"tca must be a TcaSpec or one of {sorted(CATALOGUE)}, got {shown(tca)}"
-                f"{nearest(tca, CATALOGUE)}"
-            )
-        tca = CATALOGUE[tca]
+    if isinstance(tca, str | Path):
+        tca = find_tca(tca)
     name = f"tca{len(part.tcas)}" if name is None else name
     if name in [other.name for other in part.tcas]:
         raise ValueError(f"name must be new in this part, got {name!r} again")

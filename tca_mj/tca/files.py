@@ -17,7 +17,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator, Mapping
 from collections.abc import Set as AbstractSet
-from dataclasses import dataclass, field, fields, is_dataclass
+from dataclasses import dataclass, field, fields, is_dataclass, replace
 from functools import cache
 from pathlib import Path
 from typing import Any, get_args, get_type_hints
@@ -164,6 +164,43 @@ def find_tca(tca: TcaSpec | str | Path) -> TcaSpec:
             f" got {shown(tca)}{nearest(tca, CATALOGUE)}"
         )
     return CATALOGUE[str(tca)]
+
+
+@door
+def with_tca(robot: Any, tca: TcaSpec | str | Path) -> Any:
+    """A robot's specification with another TCA wherever it has one.
+
+    What builds the robot cuts it to its routes and lays it into silicone as it does with its own.
+
+    Args:
+        robot: The specification, of a module or of what is made of modules.
+        tca: The TCA, as for ``find_tca``.
+
+    Raises:
+        ValueError: If the robot has no TCA, it cannot have this one, or as ``find_tca``.
+
+    Example:
+        >>> from tca_mj import BendingSpec
+        >>> from tca_mj.tca import with_tca
+        >>> round(with_tca(BendingSpec(), "type-2-180").embedded.coils)
+        143
+    """
+    found = find_tca(tca)
+
+    def changed(spec: Any) -> Any:
+        if isinstance(spec, TcaSpec):
+            return found
+        if not is_dataclass(spec) or isinstance(spec, type):
+            return spec
+        now = {each.name: getattr(spec, each.name) for each in fields(spec) if each.init}
+        new = {name: changed(value) for name, value in now.items()}
+        new = {name: value for name, value in new.items() if value is not now[name]}
+        return replace(spec, **new) if new else spec
+
+    result = changed(robot)
+    if result is robot and found is not robot:
+        raise ValueError(f"robot must be a specification with a TCA, got {shown(robot)}")
+    return result
 
 
 def _json(value: Any) -> str:

@@ -31,8 +31,8 @@ class Source(Checked):
     Attributes:
         kind: ``weighed``, ``measured`` (by ruler, caliper, meter), ``fitted`` to data,
             ``published``, or an ``estimate``.
-        error: Standard error, in the number's unit; of a row one for each of its numbers; None if
-            it is not known.
+        error: Standard error, of a row one for each of its numbers; None if it is not known [the
+            number's unit].
         data: From what: files of data, a publication, or how.
     """
 
