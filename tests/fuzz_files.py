@@ -19,7 +19,16 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from fuzz_samples import TASK, good, model_zip, recorded, shipped_policy, statistics, task_env
+from fuzz_samples import (
+    TASK,
+    good,
+    model_zip,
+    muscle,
+    recorded,
+    shipped_policy,
+    statistics,
+    task_env,
+)
 from hypothesis import strategies as st
 
 import tca_mj
@@ -32,6 +41,7 @@ from tca_mj.agents.train.runs import RUN, STATE, RunFolder
 from tca_mj.assets import mjcf
 from tca_mj.model.scene import scene
 from tca_mj.record import read
+from tca_mj.tca import read_tca
 
 WALK = "TCA/TetrapodWalk-v0"
 # What a number, a text or a list in a file may be instead.
@@ -235,6 +245,7 @@ READERS: dict[str, Reader] = {
     ),
     "network.onnx": Reader(_onnx, lambda path: _acts(path, task_env(TASK, action="power")),
                            ".onnx"),
+    "tca.json": Reader(lambda: muscle().read_bytes(), read_tca, ".json"),
     "statistics.npz": Reader(lambda: statistics().read_bytes(), Statistics.read, ".npz"),
     "recording.rrd": Reader(lambda: recorded().read_bytes(), read, ".rrd"),
     RUN: Reader(lambda: _written(RUN), lambda path: _run(path, RUN), ".json"),

@@ -10,7 +10,7 @@ import math
 import typing
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import is_dataclass
+from dataclasses import fields, is_dataclass
 from functools import cache
 from pathlib import Path
 from types import NoneType, UnionType
@@ -108,6 +108,14 @@ def recorded() -> Path:
 
 
 @cache
+def muscle() -> Path:
+    from tca_mj.tca import MATERIALS, write_tca
+
+    sources = MATERIALS["silver-coated nylon sewing thread"].sources
+    return write_tca(Path("muscle.json").absolute(), good(tca_mj.TcaSpec), sources)
+
+
+@cache
 def statistics() -> Path:
     path = Path("statistics.npz").absolute()
     np.savez(path, mean=np.zeros(3), var=np.ones(3), clip=10.0, epsilon=1e-8)
@@ -192,7 +200,19 @@ BY_SURFACE: dict[str, dict[str, Any]] = {
     },
     "tca.spec.TcaSpec.from_mandrel": {
         "core_diameter": 4e-4, "fibre_length": 0.175, "groove_pitch_angle": 0.35,
+        "resistance_per_length": 67.0,
     },
+    "tca.spec.TcaSpec.from_measured": {"**": lambda: {"fibre_length": 0.175, "coils": 60.0}},
+    "tca.spec.FibreSpec": {"**": lambda: {
+        field.name: getattr(good(tca_mj.TcaSpec).fibre, field.name)
+        for field in fields(good(tca_mj.TcaSpec).fibre)
+    }},
+    "tca.materials.Material.fibre": {
+        "radius": 2e-4, "inserted_twist": 4000.0, "line_density": 1e-4,
+    },
+    "tca.files.read_tca": {"path": lambda: muscle()}, "tca.files.write_tca": {"path": "made.json"},
+    "tca.files.find_tca": {"tca": "free-stroke"},
+    "tca.files.with_tca": {"robot": lambda: tca_mj.BendingSpec(), "tca": "free-stroke"},
     "tca.mandrel.kept_share": {"groove_pitch_angle": 0.35, "annealing_temperature": 180.0},
     "tca.supply.Supply.checked": {"n": 1},
     "variation.Nominal.apply": {"variation": lambda: variation.Variation()},
@@ -428,6 +448,7 @@ def _samples() -> dict[Any, Callable[[], Any]]:
     return {
         tca.TcaSpec: lambda: fibre, tca.FibreSpec: lambda: fibre.fibre,
         tca.FibreSpec | tca.FibreTable: lambda: fibre.fibre,
+        tca.Material: lambda: tca.MATERIALS["nylon monofilament"],
         tca.TcaBank: bank, tca.TcaState: lambda: bank().rest(),
         tca.Pull: lambda: bank().pull(bank().rest(), [0.045]),
         tca.CreepBank: creeping, tca.CreepState: lambda: creeping().rest(),

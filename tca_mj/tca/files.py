@@ -188,17 +188,17 @@ def with_tca(robot: Any, tca: TcaSpec | str | Path) -> Any:
     found = find_tca(tca)
 
     def changed(spec: Any) -> Any:
+        """The specification with it; None if it has no TCA."""
         if isinstance(spec, TcaSpec):
             return found
         if not is_dataclass(spec) or isinstance(spec, type):
-            return spec
-        now = {each.name: getattr(spec, each.name) for each in fields(spec) if each.init}
-        new = {name: changed(value) for name, value in now.items()}
-        new = {name: value for name, value in new.items() if value is not now[name]}
-        return replace(spec, **new) if new else spec
+            return None
+        inside = {each.name: changed(getattr(spec, each.name)) for each in fields(spec)}
+        new = {name: value for name, value in inside.items() if value is not None}
+        return replace(spec, **new) if new else None
 
     result = changed(robot)
-    if result is robot and found is not robot:
+    if result is None:
         raise ValueError(f"robot must be a specification with a TCA, got {shown(robot)}")
     return result
 
