@@ -1,7 +1,9 @@
 """A muscle of one's own: materials, what ruler, caliper and scale say, and robots that have it."""
 
 import math
+import re
 from dataclasses import replace
+from pathlib import Path
 
 import gymnasium
 import numpy as np
@@ -15,6 +17,7 @@ from tca_mj.registry import TASKS, task_class
 from tca_mj.tca import (
     CATALOGUE,
     MATERIALS,
+    CoilRods,
     FibreSpec,
     Plies,
     TcaSpec,
@@ -122,6 +125,32 @@ def test_what_is_not_measured_is_an_estimate_or_unknown():
         fibre=SEWING.measured, rest_length=0.05, fibre_length=0.175, coils=60.0, resistance=3.0,
         mass=25e-6,
     )  # fmt: skip
+
+
+def test_the_page_says_what_a_wrong_measurement_costs():
+    """5 % too much of one, of type 2-180: blocked force at 125 °C, stiffness, free stroke."""
+    good = {
+        "fibre": TYPE_2.fibre, "rest_length": 0.109, "contact_length": TYPE_2.minimum_length,
+        "resistance": 8.94, "thickness": 0.34e-3, "fibre_length": 0.350, "outer_diameter": 1.08e-3,
+    }  # fmt: skip
+
+    def figures(**change):
+        tca = TcaSpec.from_measured(**good | change)
+        force, _ = tension(tca, 0.109, 125.0)
+        return np.array([force, CoilRods([tca]).rest_stiffness[0], tca.free_stroke])
+
+    page = (Path(__file__).parents[1] / "docs" / "own-muscle.md").read_text(encoding="utf-8")
+    found = re.findall(r"^\|.*\| `([\w.]+)` \|((?: [-+\d]+ % \|){3})$", page, re.MULTILINE)
+    rows = dict(found)
+    for name, said in rows.items():
+        field = name.removeprefix("fibre.")
+        change = {name: 1.05 * good[name]} if name in good else {
+            "fibre": replace(TYPE_2.fibre, **{field: 1.05 * getattr(TYPE_2.fibre, field)})
+        }  # fmt: skip
+        found = [f"{round(100.0 * x):+d} %".replace("+0", "0") for x in
+                 figures(**change) / figures() - 1.0]  # fmt: skip
+        assert f" {' | '.join(found)} |" == said, name
+    assert len(rows) == 9
 
 
 @pytest.mark.parametrize("lay", [0.0, 0.35])
