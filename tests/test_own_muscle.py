@@ -12,7 +12,8 @@ import pytest
 import tca_mj
 from tca_mj import cli
 from tca_mj.agents import Evaluation, designed
-from tca_mj.agents.policies import contract, differences
+from tca_mj.agents.policies import contract, differences, load_policy
+from tca_mj.agents.train.config import default_config
 from tca_mj.registry import TASKS, task_class
 from tca_mj.tca import (
     CATALOGUE,
@@ -276,6 +277,23 @@ def test_a_policy_is_refused_on_another_muscle(mine, capsys):
     assert cli.main([*demo, "--tca", str(path), "--no-video"]) == 2
     said = capsys.readouterr().err
     assert "env must be what" in said and "'leg.tca.coil_radius' 0.000426" in said, said
+
+
+def test_a_run_does_not_go_on_with_another_muscle(mine, tmp_path, monkeypatch, capsys):
+    """A file of the same name that holds another one."""
+    pytest.importorskip("stable_baselines3")
+    odd, path = mine
+    monkeypatch.chdir(tmp_path)
+    command = ["train", REACH, "--tca", path.name, "--steps", "16", "--envs", "2", "--no-video"]
+    assert cli.main([*command, "--out", "run"]) == 0
+    assert load_policy("run", tca_mj.make(REACH, tca=odd, action="power"))
+    with pytest.raises(ValueError, match=r"robot: .*'tca.coil_radius' 0.00037"):
+        load_policy("run", tca_mj.make(REACH, action="power"))
+    write_tca(path, replace(odd, heat_loss=0.2))
+    assert cli.main([*command, "--out", "run"]) == 2
+    assert "holds a run in another task, robot: 'tca.heat_loss' 0.1013" in capsys.readouterr().err
+    with pytest.raises(ValueError, match=r"arguments\['tca'\] must be a name or a file"):
+        default_config(REACH, arguments={"tca": odd})
 
 
 def test_what_a_file_holds_tells_evaluations_apart(mine):

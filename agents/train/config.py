@@ -180,6 +180,11 @@ class TrainConfig(Checked):
             )
         if self.retold and not self.mirrored:
             raise ValueError("retold must be False where memories are not mirrored, got True")
+        if not isinstance(self.arguments.get("tca", ""), str):
+            raise ValueError(
+                "arguments['tca'] must be a name or a file, to be found again when a run goes on,"
+                f" got {shown(self.arguments['tca'])}"
+            )
         for name in self.growth:
             require_one_of("growth", name, list(self.options))
         if self.residual and not task.legs:

@@ -32,7 +32,7 @@ from tca_mj.agents.episode import RECORDING, VIDEO, Episode
 from tca_mj.agents.output import write_csv
 from tca_mj.agents.policies import Model, Network, SavedPolicy, Statistics
 from tca_mj.agents.policies.actors import first_gait
-from tca_mj.agents.policies.contracts import contract
+from tca_mj.agents.policies.contracts import contract, differences
 from tca_mj.agents.progress import progress_bar
 from tca_mj.agents.rollout import earned, rollout
 from tca_mj.agents.train.config import TrainConfig
@@ -189,6 +189,8 @@ class Run:
         task: Any = self.test_env.unwrapped
         self._units = task.observation.units if config.scaled else None
         self._made_for = contract(self.test_env)
+        if self.best and (apart := differences(self.best[1].made_for, self._made_for)):
+            raise ValueError(f"{folder.path} holds a run in another task, {' | '.join(apart)}")
         self.board = folder.tensorboard(self.model.num_timesteps)
         for kind, known_rows in (("training", self.rows), ("evaluation", self.evaluations)):
             if known_rows and known_rows[-1]["steps"] == self.model.num_timesteps:
