@@ -25,7 +25,7 @@ from tca_mj.modules.continuum_leg import LegSpec, continuum_leg
 from tca_mj.modules.finger import finger_pair
 from tca_mj.modules.morphing import morphing_module
 from tca_mj.rod import Segment, solve_series
-from tca_mj.tca import law_at
+from tca_mj.tca import law_at, write_tca
 
 ROOT = Path(__file__).parent.parent
 LENGTH, RADIUS = 45e-3, 3.2e-3
@@ -357,11 +357,11 @@ import math
 import tca_mj
 from tca_mj.modules.bending import silicone_cylinder
 
-def good(nodes=8):
+def good(nodes=8, tca="free-stroke"):
     part = tca_mj.Part(tca_mj.new_spec("good"))
     soft = silicone_cylinder(45e-3, 8e-3, 8e-3)
     chain = tca_mj.add_chain(part, soft, nodes=nodes, name="body")
-    tca_mj.add_tca(part, chain, tca_mj.Helix(3e-3), "free-stroke")
+    tca_mj.add_tca(part, chain, tca_mj.Helix(3e-3), tca)
     return part
 
 def wrong():
@@ -401,6 +401,18 @@ def test_the_command_prints_the_table_and_its_exit_code_is_the_verdict(folder, c
     coarse = ["certify", "robots_here:good", *options, "--workers", "1", "--nodes", "4"]
     assert cli.main([*coarse, "--tolerance", "0.1", "--angle", "0.5"]) == 1
     assert "body of 4 nodes" in capsys.readouterr().out
+
+
+def test_the_command_gives_the_robot_a_muscle(folder, capsys):
+    """Softer sewing thread bends it less: the case is another one, and theory holds for both."""
+    write_tca("mine.json", tca_mj.CATALOGUE["type-2-180"])
+    bends = []
+    for tca in ("mine.json", "self-coiled"):
+        command = ["certify", "robots_here:good", "--tca", tca, "--hot", "90", "--out", tca[:4]]
+        assert cli.main([*command, "--gravity", "0", "0", "0", "--workers", "1"]) == 0
+        written = json.loads((folder / tca[:4] / "report.json").read_text(encoding="utf-8"))
+        bends.append(max(case["bend"] for case in written["cases"]))
+    assert abs(bends[0] - bends[1]) > 1e-2
 
 
 @pytest.mark.parametrize(

@@ -17,6 +17,7 @@ from tca_mj.agents.policies import (
     load_policy,
 )
 from tca_mj.modules import BendingSpec
+from tca_mj.tca import Plies, with_tca
 
 REACH = "TCA/BendReach-v0"
 
@@ -79,6 +80,18 @@ def test_what_differs_is_said(saved, tmp_path, env):
             load_policy(path, env)
         assert digest(changed) != digest(made_for) or "order" in message
     assert differences(made_for, made_for) == []
+
+
+def test_what_is_none_is_as_good_as_missing_and_figures_have_no_order(saved):
+    """Files from before a robot could have a part, or its figures stood elsewhere, stay good."""
+    made_for, robot = saved.made_for, saved.made_for["robot"]
+    assert robot["tca.plies"] is None
+    older = {name: robot[name] for name in reversed(robot) if name != "tca.plies"}
+    assert differences({**made_for, "robot": older}, made_for) == []
+    assert differences(made_for, {**made_for, "robot": older}) == []
+    plied = with_tca(BendingSpec(), replace(BendingSpec().tca, plies=Plies(strands=2)))
+    apart = differences(made_for, contract(tca_mj.make(REACH, module_spec=plied)))
+    assert "'tca.plies.strands' missing, not 2" in apart[-1]
 
 
 def test_a_contract_is_plain_and_complete(env):

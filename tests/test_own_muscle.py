@@ -14,6 +14,7 @@ from tca_mj import cli
 from tca_mj.agents import Evaluation, designed
 from tca_mj.agents.policies import contract, differences, load_policy
 from tca_mj.agents.train.config import default_config
+from tca_mj.modules.bending import silicone_cylinder
 from tca_mj.registry import TASKS, task_class
 from tca_mj.tca import (
     CATALOGUE,
@@ -242,6 +243,17 @@ def test_every_task_takes_a_muscle(task, mine):
     differ = differences(contract(tca_mj.make(task)), contract(env))
     assert differ[-1].startswith("robot: ") and "coil_radius" in str(differ)
     assert hasattr(env.unwrapped, argument)
+
+
+def test_several_tasks_and_robots_of_ones_own_take_a_file(mine):
+    odd, path = mine
+    several = gymnasium.make_vec(REACH, num_envs=2, tca=path)
+    assert {spec.coil_radius for env in several.envs for spec in env.sim.bank.specs} == {
+        odd.coil_radius
+    }
+    part = tca_mj.Part(tca_mj.new_spec("own"))
+    chain = tca_mj.add_chain(part, silicone_cylinder(45e-3, 8e-3, 8e-3), nodes=4, name="body")
+    assert tca_mj.add_tca(part, chain, tca_mj.Helix(3e-3), path).spec == odd.of_length(45e-3)
 
 
 def test_a_robot_that_a_muscle_does_not_fit_says_why():
