@@ -203,7 +203,7 @@ BY_SURFACE: dict[str, dict[str, Any]] = {
         "resistance_per_length": 67.0,
     },
     "tca.spec.TcaSpec.from_measured": {"**": lambda: {"fibre_length": 0.175, "coils": 60.0}},
-    "tca.spec.FibreSpec": {"**": lambda: {
+    "tca.thread.FibreSpec": {"**": lambda: {
         field.name: getattr(good(tca_mj.TcaSpec).fibre, field.name)
         for field in fields(good(tca_mj.TcaSpec).fibre)
     }},

@@ -40,7 +40,7 @@ from tca_mj.tca.sensing.wire import (
     resistance_displacement,
     sensed_length,
 )
-from tca_mj.tca.spec import FibreSpec, Plies, TcaSpec, still_air_loss
+from tca_mj.tca.spec import Plies, TcaSpec
 from tca_mj.tca.supply import Supply, Thermostat
 from tca_mj.tca.thermal import (
     BodyHeat,
@@ -50,6 +50,7 @@ from tca_mj.tca.thermal import (
     power_from_voltage,
     step_temperature,
 )
+from tca_mj.tca.thread import FibreSpec, still_air_loss
 
 __all__ = [
     "BodyHeat", "CATALOGUE", "CONICAL", "CalibrationError", "Centreline", "CoilRods", "CoilShape",

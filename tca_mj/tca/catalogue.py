@@ -23,7 +23,8 @@ from types import MappingProxyType
 from typing import Any
 
 from tca_mj.tca.materials import MATERIALS, Named
-from tca_mj.tca.spec import TcaSpec, still_air_loss
+from tca_mj.tca.spec import TcaSpec
+from tca_mj.tca.thread import still_air_loss
 
 _THREAD = MATERIALS["silver-coated nylon sewing thread"].measured
 # Sun, Table 3.1. The softening by load was fitted to three loads of the free-stroke TCA up to 60 g

@@ -15,7 +15,7 @@ from typing import Annotated, Any, Literal
 
 from tca_mj.checks import Checked, NotNegative, Positive, door, quantity, row
 from tca_mj.hints import nearest
-from tca_mj.tca.spec import FibreSpec
+from tca_mj.tca.thread import FibreSpec
 
 
 def _error(name: str, value: Any) -> float | tuple[float, ...]:

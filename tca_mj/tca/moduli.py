@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 
 from tca_mj.checks import Array, door, floats, within
 from tca_mj.tca.arrays import column, frozen
-from tca_mj.tca.spec import FibreSpec
+from tca_mj.tca.thread import FibreSpec
 
 
 class FibreTable(NamedTuple):

@@ -25,7 +25,7 @@ from tca_mj.rod.lie import integrate_strain, matrix_quaternion, quaternion_matri
 from tca_mj.rod.solving import with_finer_meshes
 from tca_mj.tca.fibre.centreline import Centreline
 from tca_mj.tca.moduli import radial_growth, softening, untwist
-from tca_mj.tca.spec import FibreSpec
+from tca_mj.tca.thread import FibreSpec
 
 _PER_TURN = 10  # intervals of the first mesh per turn of the frame
 _FINEST = 50_000  # intervals

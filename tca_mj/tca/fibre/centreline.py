@@ -21,7 +21,8 @@ from tca_mj.checks import Array, Checked, Positive, door, number, require_positi
 from tca_mj.quadrature import GaussRule
 from tca_mj.rod.lie import matrix_quaternion, quaternion_exp, quaternion_matrix, running_product
 from tca_mj.tca.catalogue import CATALOGUE
-from tca_mj.tca.spec import FibreSpec, TcaSpec
+from tca_mj.tca.spec import TcaSpec
+from tca_mj.tca.thread import FibreSpec
 
 # Gauss's points on [0, 1]: two for the frames, four for the length.
 _FRAMES, _RULE = GaussRule.of(2), GaussRule.of(4)
