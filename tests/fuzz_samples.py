@@ -211,6 +211,10 @@ BY_SURFACE: dict[str, dict[str, Any]] = {
         "radius": 2e-4, "inserted_twist": 4000.0, "line_density": 1e-4,
     },
     "tca.files.read_tca": {"path": lambda: muscle()}, "tca.files.write_tca": {"path": "made.json"},
+    "tca.files.measured_tca": {"errors": {"coils": 0.5}, "**": lambda: {
+        "fibre": good(tca_mj.TcaSpec).fibre, "rest_length": 0.05, "resistance": 3.0,
+        "fibre_length": 0.175, "coils": 60.0,
+    }},
     "tca.files.find_tca": {"tca": "free-stroke"},
     "tca.files.with_tca": {"robot": lambda: tca_mj.BendingSpec(), "tca": "free-stroke"},
     "tca.mandrel.kept_share": {"groove_pitch_angle": 0.35, "annealing_temperature": 180.0},

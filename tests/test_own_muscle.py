@@ -24,6 +24,7 @@ from tca_mj.tca import (
     Plies,
     TcaSpec,
     hanging_length,
+    measured_tca,
     read_tca,
     still_air_loss,
     tension,
@@ -153,6 +154,35 @@ def test_the_page_says_what_a_wrong_measurement_costs():
                  figures(**change) / figures() - 1.0]  # fmt: skip
         assert f" {' | '.join(found)} |" == said, name
     assert len(rows) == 9
+
+
+def test_errors_of_measurements_become_errors_of_the_numbers():
+    """Against a thousand TCAs that were measured with such errors, and by hand."""
+    good = {"rest_length": 0.109, "fibre_length": 0.350, "outer_diameter": 1.08e-3, "mass": 32e-6,
+            "thickness": 0.34e-3, "contact_length": 0.070, "resistance": 8.94}  # fmt: skip
+    errors = {"rest_length": 1e-3, "fibre_length": 2e-3, "outer_diameter": 2e-5, "mass": 1e-6}
+    found = measured_tca(
+        errors=errors, sources=SEWING.sources, fibre=TYPE_2.fibre, note="blue", **good
+    )
+    assert found.spec == TcaSpec.from_measured(fibre=TYPE_2.fibre, **good) and found.note == "blue"
+    said = found.provenance
+    draws = np.random.default_rng(0).normal(size=(1000, len(errors)))
+    drawn = [
+        TcaSpec.from_measured(fibre=TYPE_2.fibre, **good | {
+            name: good[name] + errors[name] * x for name, x in zip(errors, row, strict=True)
+        }) for row in draws
+    ]  # fmt: skip
+    for name in ("coil_radius", "pitch_angle", "minimum_pitch_angle", "resistance_per_length"):
+        spread = np.std([getattr(tca, name) for tca in drawn])
+        assert said[name].kind == "measured" and said[name].error == pytest.approx(spread, rel=0.1)
+    density = found.spec.fibre.line_density * math.hypot(1.0 / 32.0, 2.0 / 350.0)
+    assert said["fibre.line_density"].error == pytest.approx(density, rel=0.02)
+    assert said["coil_radius"].error == pytest.approx(1e-5, rel=1e-9)
+    assert said["coil_radius"].data == "from outer_diameter"
+    assert said["fibre.young"] == SEWING.sources["fibre.young"]
+    for name in ("coils", "fibre"):
+        with pytest.raises(ValueError, match=f"errors must be of .*'rest_length'.*, got '{name}'"):
+            measured_tca(errors={name: 1.0}, fibre=TYPE_2.fibre, **good)
 
 
 @pytest.mark.parametrize("lay", [0.0, 0.35])

@@ -6,7 +6,7 @@ from tca_mj.tca.dynamics.stepping import LoadedTcas, MotionSolveError
 from tca_mj.tca.embedding import in_silicone, ring_conductance, silicone_body
 from tca_mj.tca.fibre.boundary import FibreShape, Stiffness, fibre_stiffness, solve_fibre
 from tca_mj.tca.fibre.centreline import CONICAL, Centreline, ConicalTca
-from tca_mj.tca.files import TcaFile, find_tca, read_tca, with_tca, write_tca
+from tca_mj.tca.files import TcaFile, find_tca, measured_tca, read_tca, with_tca, write_tca
 from tca_mj.tca.laws.creep import (
     CreepBank,
     CreepSpec,
@@ -62,8 +62,8 @@ __all__ = [
     "TcaFile", "TcaMelted", "TcaSpec", "TcaState", "TensionLaw", "Thermostat", "WireTable", "aged",
     "calibrate", "coil_tension", "fibre_stiffness", "find_tca", "fit_displacement",
     "hanging_length", "heat_lost", "hysteresis_damping", "in_silicone", "kept_share", "law_at",
-    "measured", "moving_average", "power_from_voltage", "pulling_temperature", "pulse_mean",
-    "pulse_power", "radial_growth", "read_tca", "relaxation_time", "resistance",
+    "measured", "measured_tca", "moving_average", "power_from_voltage", "pulling_temperature",
+    "pulse_mean", "pulse_power", "radial_growth", "read_tca", "relaxation_time", "resistance",
     "resistance_displacement", "ring_conductance", "sensed_length", "silicone_body",
     "softened_tension", "softening", "solve_course", "solve_fibre", "step_temperature",
     "still_air_loss", "tension", "untwist", "with_tca", "write_tca",

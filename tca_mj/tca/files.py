@@ -15,6 +15,7 @@ Numbers are written with all their digits: what is read is what was written, to 
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Iterator, Mapping
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, field, fields, is_dataclass, replace
@@ -22,7 +23,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any, get_args, get_type_hints
 
-from tca_mj.checks import Checked, door, shown
+from tca_mj.checks import Checked, Positive, door, shown
 from tca_mj.files import write_whole
 from tca_mj.hints import nearest
 from tca_mj.tca.catalogue import CATALOGUE
@@ -81,6 +82,61 @@ class TcaFile(Checked):
                     f"provenance[{name!r}].error must have the form of the value {value!r},"
                     f" got {error!r}"
                 )
+
+
+@door
+def measured_tca(
+    *, errors: Mapping[str, Positive], sources: Mapping[str, Source] | None = None, note: str = "",
+    **measured: Any,
+) -> TcaFile:  # fmt: skip
+    """A TCA from what was measured of it, and what the errors of that make of its numbers.
+
+    Errors are taken for independent and small: each moves all numbers that follow from it, and the
+    squares add up. That numbers move together, as pitch and radius with the natural length, is not
+    kept.
+
+    Args:
+        errors: Standard errors of numbers in ``measured``, by name [their units].
+        sources: Of numbers that were not measured, as ``Material.sources``.
+        note: What else is to be known.
+        **measured: Arguments of ``TcaSpec.from_measured``.
+
+    Raises:
+        ValueError: As ``TcaSpec.from_measured``, if there is an error of what was not measured, or
+            one so large that what it makes of the measurements is no TCA.
+
+    Example:
+        >>> from tca_mj.tca import MATERIALS, measured_tca
+        >>> mine = measured_tca(
+        ...     fibre=MATERIALS["silver-coated nylon sewing thread"].measured, resistance=3.0,
+        ...     rest_length=45e-3, fibre_length=175e-3, coils=63.0,
+        ...     errors={"rest_length": 0.5e-3, "fibre_length": 1e-3},
+        ... )
+        >>> print(f"{mine.spec.coil_radius:.2e} m to {mine.provenance['coil_radius'].error:.0e} m")
+        4.27e-04 m to 3e-06 m
+    """
+    spec = TcaSpec.from_measured(**measured)
+    values = {name: value for name, value in _flat(spec) if isinstance(value, float)}
+    square, by = dict.fromkeys(values, 0.0), {name: list[str]() for name in values}
+    known = [name for name, value in measured.items() if isinstance(value, float | int)]
+    for cause, error in errors.items():
+        if cause not in known:
+            raise ValueError(
+                f"errors must be of {known}, got {shown(cause)}{nearest(cause, known)}"
+            )
+        moved = dict(_flat(TcaSpec.from_measured(**{**measured, cause: measured[cause] + error})))
+        for name, value in values.items():
+            if moved[name] != value:
+                square[name] += (moved[name] - value) ** 2
+                by[name].append(cause)
+    found = {
+        name: Source(
+            kind="weighed" if by[name][0] == "mass" else "measured", error=math.sqrt(square[name]),
+            data=f"from {', '.join(by[name])}",
+        )
+        for name in values if by[name]
+    }  # fmt: skip
+    return TcaFile(spec=spec, provenance={**(sources or {}), **found}, note=note)
 
 
 @door

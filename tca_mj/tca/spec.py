@@ -146,8 +146,9 @@ class TcaSpec(Checked):
             coils: Their number.
             thickness: Of the twisted fibre, across, which is taken off the outer diameter; None for
                 twice ``fibre.radius``, though that is of the circle that carries load [m].
-            contact_length: Length when it is hot and its coils touch; None for close packing, which
-                real threads do not reach: see ``from_mandrel`` [m].
+            contact_length: Length when it is hot and its coils touch, the natural one less the free
+                stroke; None for close packing, which real threads do not reach: see
+                ``from_mandrel`` [m].
             mass: Of the fibre in the coil, from which ``fibre.line_density`` follows; None keeps
                 what the fibre has [kg].
             breaking_force: Tension at which it breaks; None if that is not known [N].
@@ -179,7 +180,7 @@ class TcaSpec(Checked):
         if contact_length is not None:
             number("contact_length", contact_length, below=rest_length, unit="m, the rest_length")
             wound = along * math.sin(lay)
-            touching = math.asin(min(math.hypot(contact_length, wound) / fibre_length, 1.0))
+            touching = math.asin(math.hypot(contact_length, wound) / fibre_length)
         if mass is not None:
             fibre = replace(fibre, line_density=mass / (strands * fibre_length))
         return cls(
