@@ -179,6 +179,7 @@ def test_errors_of_measurements_become_errors_of_the_numbers():
     assert said["fibre.line_density"].error == pytest.approx(density, rel=0.02)
     assert said["coil_radius"].error == pytest.approx(1e-5, rel=1e-9)
     assert said["coil_radius"].data == "from outer_diameter"
+    assert said["fibre.line_density"].kind == "weighed" and said["heat_loss"].kind == "estimate"
     assert said["fibre.young"] == SEWING.sources["fibre.young"]
     for name in ("coils", "fibre"):
         with pytest.raises(ValueError, match=f"errors must be of .*'rest_length'.*, got '{name}'"):

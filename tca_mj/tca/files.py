@@ -47,6 +47,12 @@ _UNITS: Mapping[str, str | list[str] | None] = {
     "contact_ratio": "1", "contact_smoothing": "1", "plies.strands": "1", "plies.lay_angle": "rad",
 }  # fmt: skip
 
+# What ``TcaSpec.from_measured`` guesses where something was not measured.
+_GUESSED = (
+    ("heat_loss", "heat_loss", "still air, by circumference as of silver-coated sewing thread"),
+    ("minimum_pitch_angle", "contact_length", "close packing"),
+)
+
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class TcaFile(Checked):
@@ -131,12 +137,16 @@ def measured_tca(
                 by[name].append(cause)
     found = {
         name: Source(
-            kind="weighed" if by[name][0] == "mass" else "measured", error=math.sqrt(square[name]),
+            kind="weighed" if "mass" in by[name] else "measured", error=math.sqrt(square[name]),
             data=f"from {', '.join(by[name])}",
         )
         for name in values if by[name]
     }  # fmt: skip
-    return TcaFile(spec=spec, provenance={**(sources or {}), **found}, note=note)
+    guessed = {
+        name: Source(kind="estimate", data=how) for name, cause, how in _GUESSED
+        if measured.get(cause) is None
+    }  # fmt: skip
+    return TcaFile(spec=spec, provenance={**(sources or {}), **guessed, **found}, note=note)
 
 
 @door
