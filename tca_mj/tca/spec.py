@@ -129,6 +129,8 @@ class TcaSpec(Checked):
         thickness: Annotated[float, _coil] | None = None,
         contact_length: Annotated[float, _length] | None = None,
         mass: Annotated[float, partial(size, kind="TCAs", at_most=1.0, unit="kg")] | None = None,
+        stretch_resistance: NotNegative = 0.0,
+        contraction_resistance: NotNegative = 0.0,
         breaking_force: Positive | None = None,
         heat_loss: Positive | None = None,
         plies: Plies | None = None,
@@ -151,6 +153,9 @@ class TcaSpec(Checked):
                 ``from_mandrel`` [m].
             mass: Of the fibre in the coil, from which ``fibre.line_density`` follows; None keeps
                 what the fibre has [kg].
+            stretch_resistance: Relative fall of the resistance per strain when it is pulled; 0 if
+                that was not measured, and then nobody can sense by it [1].
+            contraction_resistance: Relative rise per contraction when it is hot; likewise [1].
             breaking_force: Tension at which it breaks; None if that is not known [N].
             heat_loss: As in ``TcaSpec``; None for ``still_air_loss``, an estimate [W/(m K)].
             plies: If it has several strands. Lengths, resistance, mass and breaking force are then
@@ -188,6 +193,8 @@ class TcaSpec(Checked):
             pitch_angle=math.asin(along / fibre_length), minimum_pitch_angle=touching,
             breaking_force=breaking_force and breaking_force / (strands * math.cos(lay)),
             resistance_per_length=strands * resistance / along,
+            stretch_resistance=stretch_resistance / math.cos(lay) ** 2,
+            contraction_resistance=contraction_resistance / math.cos(lay) ** 2,
             heat_loss=still_air_loss(fibre) if heat_loss is None else heat_loss, plies=plies,
         )  # fmt: skip
 

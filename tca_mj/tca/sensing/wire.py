@@ -39,6 +39,7 @@ from tca_mj.checks import (
     every,
     floats,
     instance,
+    shown,
     whole,
     within,
 )
@@ -233,6 +234,11 @@ def fit_displacement(
     if resistance.ndim != 1:
         raise ValueError(f"resistance must have shape (k,), got {resistance.shape}")
     displacement = within("displacement", displacement, shape=resistance.shape)
+    if resistance.size and not np.ptp(resistance):
+        raise ValueError(
+            "resistance must change with the displacement, as that of a TCA with a"
+            f" contraction_resistance does, got {shown(resistance)}"
+        )
     whole("degree", degree, at_least=0, at_most=np.unique(resistance).size - 1)
     polynomial = Polynomial.fit(resistance, displacement, degree)
     error = polynomial(resistance) - displacement
