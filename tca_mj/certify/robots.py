@@ -21,7 +21,7 @@ from tca_mj.certify.outcomes import POSITION, ROTATION, Effort, Outcome, judge
 from tca_mj.certify.rest import Load
 from tca_mj.certify.solid import solid
 from tca_mj.certify.subjects import Subject, read
-from tca_mj.checks import Array, Count, Positive, Temperature, door, within
+from tca_mj.checks import Array, Count, Positive, Temperature, door, shown, within
 from tca_mj.machine import machine, versions
 from tca_mj.model.chain import MOTIONS
 from tca_mj.model.part import Part
@@ -87,8 +87,9 @@ def certify_robot(
     """
     given = {"nodes": nodes, "tca": None if tca is None else find_tca(tca)}
     given = {name: value for name, value in given.items() if value is not None}
-    if given and isinstance(robot, Part):
-        raise ValueError(f"{next(iter(given))} must be None where robot is a Part, got {given}")
+    for name, value in given.items():
+        if isinstance(robot, Part):
+            raise ValueError(f"{name} must be None where robot is a Part, got {shown(value)}")
     part = robot if isinstance(robot, Part) else built(robot, **given)
     names = [tca.name for tca in part.tcas]
     warm = within("hot", hot, above=COLD, unit="°C")
