@@ -47,7 +47,7 @@ def test_designs_are_single_figures():
     [
         ({"leg.size": 1.0}, r"design 'leg.size': the name must be one of \['length'"),
         ({"leg.length": "long"}, "design 'leg.length' must be a real number .* got 'long'"),
-        ({"leg.tca": "no-such"}, "design 'leg.tca' must be one of .* got 'no-such'"),
+        ({"leg.tca": "no-such"}, "design 'leg.tca': tca must be .* one of .* got 'no-such'"),
         ({"leg.length": -1.0}, "length"),
     ],
 )
