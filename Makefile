@@ -10,7 +10,7 @@ DEMO = runs/demo
 # Where PyTorch's CPU build is found: PyPI's, on Linux, brings 5 GB of CUDA.
 TORCH_INDEX ?= https://download.pytorch.org/whl/cpu
 
-.PHONY: help demo test bench lint clean
+.PHONY: help demo test bench docs lint clean
 
 help:  ## this list
 	@sed -n 's/^\([a-z]*\):.*## */  make \1	/p' Makefile
@@ -32,6 +32,9 @@ test: $(INSTALLED)  ## all tests
 
 bench: $(INSTALLED)  ## speed and accuracy figures, in runs/bench
 	$(BIN)/python scripts/benchmark.py --out runs/bench
+
+docs: $(INSTALLED)  ## the site, in build/site; it opens without a server
+	$(BIN)/python scripts/build_site.py
 
 lint: $(INSTALLED)  ## style and types
 	$(BIN)/ruff check .

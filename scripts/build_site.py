@@ -1,0 +1,118 @@
+"""Builds the site: every page of the project and a reference written from the code, as HTML.
+
+    python scripts/build_site.py             into build/site; open build/site/index.html
+    python scripts/build_site.py FOLDER      elsewhere
+
+A link that leads nowhere, also to a section, a page that is in no list, or a warning of any other
+kind ends it with code 1. Nothing on the site asks another host for anything.
+"""
+
+import os
+import re
+import shutil
+import sys
+from collections.abc import Iterable
+from pathlib import Path
+
+from tca_mj.files import write_whole
+
+ROOT = Path(__file__).resolve().parent.parent
+FENCE = re.compile(r"(^```.*?^```\n)", re.MULTILINE | re.DOTALL)
+LINK = re.compile(r"(\]\()([^)#:\s]+)(#[^)\s]*)?(?=\))")
+OUTSIDE = {"README.md": "overview", "CONTRIBUTING.md": "contributing", "CHANGELOG.md": "changelog"}
+SETTINGS = {
+    "project": "tca-mj", "html_title": "tca-mj", "language": "en", "extensions": ["myst_parser"],
+    "root_doc": "index", "myst_heading_anchors": 4, "suppress_warnings": [],
+    "html_theme": "furo", "html_copy_source": False, "html_show_sphinx": False,
+    "html_show_search_summary": False,  # it would fetch the pages, which no browser does from files
+    "html_theme_options": {"navigation_with_keys": True},
+}  # fmt: skip
+
+
+def place(path: str) -> str:
+    """Where a file of the project lies among the pages of the site."""
+    if path in OUTSIDE:
+        return f"{OUTSIDE[path]}.md"
+    return "index.md" if path == "docs/README.md" else path.removeprefix("docs/")
+
+
+def gather(path: str, pages: Path) -> str:
+    """A page of the project as one of the site: its links are moved, and what they lead to is copied.
+
+    Args:
+        path: The page, from the root of the project.
+        pages: Folder of the pages of the site.
+    """
+
+    def moved(link: re.Match[str]) -> str:
+        target = os.path.normpath(Path(path).parent / link[2])
+        there = pages / place(target)
+        if not target.endswith(".md") and (ROOT / target).is_file():
+            there.parent.mkdir(parents=True, exist_ok=True)
+            shutil.copyfile(ROOT / target, there)
+        near = os.path.relpath(place(target), Path(place(path)).parent)
+        return f"{link[1]}{near}{link[3] or ''}"
+
+    parts = FENCE.split((ROOT / path).read_text(encoding="utf-8"))
+    return "".join(part if i % 2 else LINK.sub(moved, part) for i, part in enumerate(parts))
+
+
+def toctree(names: Iterable[str], caption: str = "") -> str:
+    """What Sphinx makes the navigation of."""
+    head = f":caption: {caption}\n" if caption else ""
+    return "```{toctree}\n:hidden:\n:titlesonly:\n" + head + "\n" + "\n".join(names) + "\n```"
+
+
+def navigation(index: str) -> str:
+    """The start page with what Sphinx makes the navigation of: its lists of pages, by heading."""
+    lists = []
+    for title, body in re.findall(r"^### (.+)\n((?:(?!#).*\n)*)", index, re.MULTILINE):
+        names = re.findall(r"^\| \[.*?\]\(([\w-]+)\.md\)", body, re.MULTILINE)
+        lists.append(toctree(names, title))
+    lists.append(toctree(["all-tasks", "all-robots", "commands", "all-names"], "Reference"))
+    return "\n\n".join([index, *lists, toctree([*OUTSIDE.values()], "Project"), ""])
+
+
+def write_pages(pages: Path) -> None:
+    """Writes all pages of the site as Markdown into an empty folder."""
+    from reference_pages import reference  # slow: it loads all of the package
+
+    for path in [*OUTSIDE, *sorted(f"docs/{page.name}" for page in (ROOT / "docs").glob("*.md"))]:
+        text = gather(path, pages)
+        text = navigation(text) if place(path) == "index.md" else text
+        write_whole(pages / place(path), text.encode())
+    for path, (text, below) in reference().items():
+        listed = toctree([name.removesuffix(".md") for name in below]) if below else ""
+        write_whole(pages / path, f"{text}\n\n{listed}\n".encode())
+    shutil.copytree(ROOT / "docs" / "pictures", pages / "pictures", dirs_exist_ok=True)
+
+
+def build(pages: Path, out: Path) -> int:
+    """Makes HTML of pages, all or nothing; returns the exit code.
+
+    Args:
+        pages: Folder of the pages, ``index.md`` among them.
+        out: Folder of the site.
+    """
+    from sphinx.application import Sphinx
+
+    site = Sphinx(pages, None, out, pages / ".built", "html", confoverrides=SETTINGS,
+                  freshenv=True, warningiserror=True, status=None)  # fmt: skip
+    site.build()
+    return site.statuscode
+
+
+def main() -> int:
+    out = Path(sys.argv[1] if sys.argv[1:] else ROOT / "build" / "site").resolve()
+    pages = out.with_name(f"{out.name}-pages")
+    for folder in (pages, out):
+        shutil.rmtree(folder, ignore_errors=True)
+    write_pages(pages)
+    code = build(pages, out)
+    if code == 0:
+        print(f"open {out / 'index.html'}")
+    return code
+
+
+if __name__ == "__main__":
+    sys.exit(main())
