@@ -166,8 +166,8 @@ def _constant(name: str, value: Any, package: ModuleType) -> str:
     body = ast.parse(source).body
     said = ""
     for node, after in zip(body, [*body[1:], None], strict=True):
-        target = node.target if isinstance(node, ast.AnnAssign) else getattr(node, "targets", [0])[0]
-        if isinstance(target, ast.Name) and target.id == name:
+        targets = [node.target] if isinstance(node, ast.AnnAssign) else getattr(node, "targets", [])
+        if name in [target.id for target in targets if isinstance(target, ast.Name)]:
             lines = source.splitlines()[node.lineno - 1 : node.end_lineno]
             notes = (line.partition("  # ")[2] for line in lines)
             said = " ".join(note for note in notes if note and not note.startswith("fmt"))
@@ -209,7 +209,7 @@ def api() -> dict[str, str]:
             [f"`{name}`", f"[`{homes[id(value)]}`]({homes[id(value)]}.md#{name.lower()})"]
             for name, value in offered.items() if name not in own
         )  # fmt: skip
-        elsewhere = pages.table(["name", "explained with"], other) if len(own) < len(offered) else ""
+        elsewhere = pages.table(["name", "explained with"], other) if own != offered else ""
         found[f"api/{package}.md"] = pages.page(
             f"# `{package}`", prose(module), elsewhere,
             *(described(name, value, module, names) for name, value in own.items()),

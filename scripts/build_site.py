@@ -7,6 +7,7 @@ A link that leads nowhere, also to a section, a page that is in no list, or a wa
 kind ends it with code 1. Nothing on the site asks another host for anything.
 """
 
+import gc
 import os
 import re
 import shutil
@@ -22,11 +23,20 @@ LINK = re.compile(r"(\]\()([^)#:\s]+)(#[^)\s]*)?(?=\))")
 OUTSIDE = {"README.md": "overview", "CONTRIBUTING.md": "contributing", "CHANGELOG.md": "changelog"}
 SETTINGS = {
     "project": "tca-mj", "html_title": "tca-mj", "language": "en", "extensions": ["myst_parser"],
-    "root_doc": "index", "myst_heading_anchors": 4, "suppress_warnings": [],
+    "root_doc": "index", "myst_heading_anchors": 4, "smartquotes": False,
     "html_theme": "furo", "html_copy_source": False, "html_show_sphinx": False,
+    "html_use_index": False,
     "html_show_search_summary": False,  # it would fetch the pages, which no browser does from files
-    "html_theme_options": {"navigation_with_keys": True},
 }  # fmt: skip
+# What the theme leaves out for those who listen to a page or have no mouse.
+HEARD = {
+    'class="caption" role="heading"': 'class="caption" role="heading" aria-level="2"',
+    '<aside class="sidebar-drawer"': '<aside aria-label="All pages" class="sidebar-drawer"',
+    '<aside class="toc-drawer': '<aside aria-label="This page" class="toc-drawer',
+    '<div id="search-results">': '<h1>Search</h1>\n<div id="search-results">',
+    '<div class="table-wrapper': '<div tabindex="0" class="table-wrapper',
+    "<pre>": '<pre tabindex="0">',
+}
 
 
 def place(path: str) -> str:
@@ -37,7 +47,7 @@ def place(path: str) -> str:
 
 
 def gather(path: str, pages: Path) -> str:
-    """A page of the project as one of the site: its links are moved, and what they lead to is copied.
+    """A page of the project as one of the site: its links are moved, what they lead to is copied.
 
     Args:
         path: The page, from the root of the project.
@@ -96,9 +106,15 @@ def build(pages: Path, out: Path) -> int:
     """
     from sphinx.application import Sphinx
 
+    gc.set_threshold(200_000)  # a page is many small nodes, among which there is little to collect
     site = Sphinx(pages, None, out, pages / ".built", "html", confoverrides=SETTINGS,
                   freshenv=True, warningiserror=True, status=None)  # fmt: skip
     site.build()
+    for page in out.rglob("*.html"):
+        text = page.read_text(encoding="utf-8")
+        for silent, heard in HEARD.items():
+            text = text.replace(silent, heard)
+        page.write_text(text, encoding="utf-8")
     return site.statuscode
 
 

@@ -46,7 +46,8 @@ def texts() -> dict[str, str]:
 
 def links(guides: Mapping[str, str], names: Iterable[str]) -> str:
     """Links to guides, called by their titles."""
-    return ", ".join(f"[{guides[name].partition(chr(10))[0].strip('# ')}]({name})" for name in names)
+    titles = {name: guides[name].partition("\n")[0].strip("# ") for name in names}
+    return ", ".join(f"[{title}]({name})" for name, title in titles.items())
 
 
 def first_line(value: Any) -> str:
@@ -88,14 +89,14 @@ def task_page(id: str, guides: Mapping[str, str], log: Sequence[str]) -> str:
         "learned policies": ", ".join(f"`{name}` ({policy.kind} by {policy.origin.algorithm})"
                                       for name, policy in policies.items()),
         "finer models": ", ".join(f"`{name}`" for name in kind.finer),
-        "learned by": plain(described(default_config(id, known[0])).partition(": ")[2]) if known else "",
+        "learned by": described(default_config(id, known[0])).partition(": ")[2] if known else "",
     }  # fmt: skip
     curves = [f"![Learning curve of {name}](pictures/curve_{name}.png)" for name in policies
               if (DOCS / "pictures" / f"curve_{name}.png").is_file()]  # fmt: skip
     text = pages.page(
         f"# `{id}`", first_line(kind), *pictures[:1],
         f"Guide: {links(guides, own)}.",
-        pages.table(["", ""], ([name, fact] for name, fact in facts.items() if fact)),
+        pages.table(["what", "value"], ([name, fact] for name, fact in facts.items() if fact)),
         "## What it is", prose(kind).partition("\n\n")[2], "## Observation", observation,
         "## Action", task.action.markdown(), "## Options of `reset`", task.options.markdown(),
         *_results(id), *(["## Learning", *curves] if curves else []),
@@ -202,8 +203,9 @@ def spec_page(kind: type, builders: Sequence[Any], guides: Mapping[str, str]) ->
                  if re.match(rf"\| ({own}(-\w+)?|module) \|", line)]  # fmt: skip
     subjects = [name for name in SUBJECTS if re.fullmatch(rf"{own}(-\w+)*", name)]
     sections = "|".join(re.findall(r"\d\.\d(?:\.\d)?", inspect.getdoc(home).partition("\n")[0]))
-    facts = [line for line in guides["validation.md"].splitlines()
-             if re.match(rf"\| (Section ({sections or 'none'})(?!\d)|source \|)", line)]  # fmt: skip
+    judged = "\n".join(text for name, text in guides.items() if name.startswith("validation"))
+    about = re.compile(rf"\| (Section ({sections or 'none'})(?!\d)|source \|)")
+    facts = [line for line in judged.splitlines() if about.match(line)]
     seen: list[Any] = []
     more = []
     for path, value in nested(spec):
@@ -265,7 +267,8 @@ def command_page() -> str:
     for name, command in commands.choices.items():
         about = command.description or abouts[name] or ""
         shaped = "\n " in about
-        blocks += [f"## `tca-mj {name}`", f"```text\n{about.rstrip()}\n```" if shaped else plain(about)]
+        said = f"```text\n{about.rstrip()}\n```" if shaped else plain(about)
+        blocks += [f"## `tca-mj {name}`", said]
         arguments = []
         for action in command._actions:
             if action.dest == "help":

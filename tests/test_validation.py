@@ -42,7 +42,7 @@ from tca_mj.validation.facts import (
 )
 
 ROOT = Path(__file__).resolve().parent.parent
-PAGE = ROOT / "docs" / "validation.md"
+PAGES = sorted((ROOT / "docs").glob("validation*.md"))
 
 
 @pytest.fixture(scope="module")
@@ -60,9 +60,13 @@ def verdicts(findings):
     return {row.fact: row.verdict for row in findings}
 
 
+def text_of_the_pages():
+    return "".join(page.read_text(encoding="utf-8") for page in PAGES)
+
+
 def rows_of_the_page():
     rows = {}
-    for line in PAGE.read_text(encoding="utf-8").splitlines():
+    for line in text_of_the_pages().splitlines():
         cells = [cell.strip() for cell in line.strip().strip("|").split(" | ")]
         if len(cells) == 6 and cells[0] not in ("source", "---"):
             rows[cells[1]] = cells[4], cells[5].strip("*")
@@ -80,7 +84,7 @@ def test_the_page_is_what_the_models_give(cheap):
 
 def test_the_page_tells_of_every_fact_and_of_what_is_missed(cheap):
     page = rows_of_the_page()
-    text = PAGE.read_text(encoding="utf-8")
+    text = text_of_the_pages()
     assert len(page) == len(set(page)) > len(cheap)
     counted = re.search(r"(\d+) facts: (\d+) held, (\d+) missed, (\d+) trend held", text)
     found = [verdict for _, verdict in page.values()]
