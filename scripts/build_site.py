@@ -7,7 +7,6 @@ A link that leads nowhere, also to a section, a page that is in no list, or a wa
 kind ends it with code 1. Nothing on the site asks another host for anything.
 """
 
-import gc
 import os
 import re
 import shutil
@@ -106,7 +105,6 @@ def build(pages: Path, out: Path) -> int:
     """
     from sphinx.application import Sphinx
 
-    gc.set_threshold(200_000)  # a page is many small nodes, among which there is little to collect
     site = Sphinx(pages, None, out, pages / ".built", "html", confoverrides=SETTINGS,
                   freshenv=True, warningiserror=True, status=None)  # fmt: skip
     site.build()
