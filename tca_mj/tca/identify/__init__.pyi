@@ -1,1 +1,17 @@
-__all__ = []
+from tca_mj.tca.identify.bench import simulated_bench
+from tca_mj.tca.identify.constants import CONSTANTS, Constant, constants_of, with_constants
+from tca_mj.tca.identify.data import Data, read_data, write_data
+from tca_mj.tca.identify.identified import (
+    Compared,
+    Found,
+    Identification,
+    Prediction,
+    identify,
+)
+from tca_mj.tca.identify.reporting import report, sources, write_identification
+
+__all__ = [
+    "CONSTANTS", "Compared", "Constant", "Data", "Found", "Identification", "Prediction",
+    "constants_of", "identify", "read_data", "report", "simulated_bench", "sources",
+    "with_constants", "write_data", "write_identification",
+]  # fmt: skip

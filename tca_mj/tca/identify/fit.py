@@ -50,14 +50,16 @@ from tca_mj.tca.laws.rod import CoilRods
 from tca_mj.tca.laws.statics import hanging_length
 from tca_mj.tca.spec import TcaSpec
 
-_SHARE = 0.2  # of the width beforehand that the data may leave of a constant they identify
+SHARE = 0.2  # of the width beforehand that the data may leave of a constant they identify
 _STEP = 1e-5  # of differences, over the width
 _ROUNDS = 4  # of fits, each with the factors that the last one gave
 _CHANGE = 0.02  # of the factors, below which there is no other
 _IMPOSSIBLE = 1e6  # residual where the laws have no answer
+_PROFILED, _NEAR = 3, 0.05  # steps of a profile; one that is followed by none
 _FEW = 20  # rows of a set, below which nothing is said of their order
-_STARTS = [(m, g) for m in (1.0, 2.0, 0.5, 4.0, 8.0) for g in (1.0, 2.0, 0.5)]
-"""Factors on moduli and growths at which a fit may start."""
+# Factors on moduli and growths at which a fit may start.
+_STARTS = ((1.0, 1.0), (2.0, 1.0), (0.5, 1.0), (4.0, 1.0), (8.0, 1.0), (1.0, 2.0), (1.0, 0.5),
+           (2.0, 2.0))  # fmt: skip
 
 
 class Known(NamedTuple):
@@ -97,7 +99,7 @@ class Problem:
         value = constants_of(tca)
         names = [n for n in (*free, *errors) if any(affects(n, each) for each in data)]
         if law == "linear":
-            names = [n for n in names if n not in MECHANICAL]
+            names = [n for n in names if n not in MECHANICAL or n == "rest_length"]
         if all("ambient" in each.fixed for each in data if each.stepped):
             names = [n for n in names if n != "ambient"]
         known = []
@@ -167,10 +169,7 @@ class Problem:
             moved[j] += _STEP * known.width
             muscle, parts = self.muscle(moved), []
             for i, data in enumerate(self.data):
-                concerned = known.name == _zero(data) if " " in known.name else (
-                    known.name in LINEAR or affects(known.name, data)
-                )
-                there = self.one(i, moved, muscle)[1] if concerned else base[i]
+                there = self.one(i, moved, muscle)[1] if concerns(known.name, data) else base[i]
                 parts.append(((there - base[i]) / (moved[j] - x[j]) / scales[i]).ravel())
             columns.append(np.concatenate(parts))
         return np.concatenate([np.array(columns).T, np.diag(1.0 / self.widths)])
@@ -207,7 +206,7 @@ class Fit:
     def identified(self) -> list[str]:
         """Names that the data identify: what they leave is a fifth of what was known before."""
         left = self.deviations / self.problem.widths
-        return [n for n, share in zip(self.problem.names, left, strict=True) if share <= _SHARE]
+        return [n for n, share in zip(self.problem.names, left, strict=True) if share <= SHARE]
 
     @property
     def criterion(self) -> float:
@@ -219,7 +218,7 @@ class Fit:
     def interval(self, name: str) -> tuple[float, float]:
         """95 % of a number by the profile of the likelihood, in its code.
 
-        Two of Newton's steps from the normal interval, with the slopes of the optimum.
+        Newton's steps from the normal interval, with the slopes of the optimum.
         """
         problem, j = self.problem, self.problem.names.index(name)
         rest = np.arange(len(self.x)) != j
@@ -230,11 +229,14 @@ class Fit:
         found = []
         for sign in (-1.0, 1.0):
             z = self.quantile
-            for _ in range(2):
+            for _ in range(_PROFILED):
                 point = self.x + sign * z * along
                 point[rest] -= inner @ (slopes.T @ problem.residuals(point, self.factors))
                 rise = float(np.sum(problem.residuals(point, self.factors) ** 2)) - best
-                z *= min(max(self.quantile / math.sqrt(max(rise, 1e-12)), 0.5), 2.0)
+                further = min(max(self.quantile / math.sqrt(max(rise, 1e-12)), 0.5), 2.0)
+                z *= further
+                if abs(further - 1.0) < _NEAR:
+                    break
             found.append(float(self.x[j] + sign * z * self.deviations[j]))
         return found[0], found[1]
 
@@ -255,7 +257,7 @@ def fitted(problem: Problem, start: Array | None = None) -> Fit:
     for _ in range(_ROUNDS):
         x = least_squares(
             problem.residuals, x, jac=problem.slopes, args=(scales,), x_scale=problem.widths,
-            method="lm", xtol=1e-8, ftol=1e-8, max_nfev=200,
+            method="lm", xtol=1e-6, ftol=1e-6, max_nfev=200,
         ).x  # fmt: skip
         pure, now = _scales(problem, x)
         settled = np.abs(now / scales - 1.0).max() < _CHANGE
@@ -330,6 +332,13 @@ def _linear_start(tca: TcaSpec) -> dict[str, float]:
 
 def _zero(data: Data) -> str:
     return f"zero of {data.name}"
+
+
+def concerns(name: str, data: Data) -> bool:
+    """Whether a number has to do with a set of measurements."""
+    if " " in name:
+        return name == _zero(data)
+    return name in LINEAR or affects(name, data)
 
 
 def natural(fit: Fit) -> dict[str, float]:

@@ -46,7 +46,7 @@ LENGTHS = ("length", "displacement", "stretch")
 HEAT = ("specific_heat", "heat_loss", "ambient", "body_conductance", "body_capacity", "body_loss",
         "line_density")  # fmt: skip
 ELECTRIC = ("resistance_per_length", "stretch_resistance", "contraction_resistance")
-_GRID = 256  # temperatures at which the resistance of a course is tabled
+_GRID = 128  # temperatures at which the resistance of a course is tabled
 _NARROW = 10.0  # range of temperatures below which no table is tried [K]
 _LOADS = 20  # different loads of one course
 
@@ -189,19 +189,21 @@ def predict(data: Data, muscle: Muscle, ends: Spin, zero: float = 0.0) -> Array:
     tca, found = muscle.tca, outcomes(data)
     if data.stepped:
         temperature = _course(data, muscle, ends)
+        acting = np.minimum(temperature, tca.fibre.melting_temperature - 1.0)  # of trials
     else:
         cold = tca.fibre.reference_temperature
-        known = data.given("temperature")
-        temperature = np.broadcast_to(np.asarray(cold if known is None else known), data.rows)
+        said = data.given("temperature")
+        temperature = np.broadcast_to(np.asarray(cold if said is None else said), data.rows)
+        acting = temperature
     result = {"temperature": temperature}
     if length_is_given(data):
         length = np.broadcast_to(_given_length(data, tca), data.rows)
     elif set(found) - {"temperature"}:
-        length = muscle.hang(temperature, _load(data), ends)
+        length = muscle.hang(acting, _load(data), ends)
         start = data.fixed.get("length", zero)
         result |= {"length": length, "displacement": start - length, "stretch": length - start}
     if "force" in found:
-        result["force"] = muscle.pull(length, temperature, ends)
+        result["force"] = muscle.pull(length, acting, ends)
     if "resistance" in found:
         result["resistance"] = muscle.ohms(length)
     return np.stack([result[name] for name in found], axis=-1)
@@ -214,15 +216,24 @@ def weighed(
 
     The residuals of a row are made independent by the factor of its effective variance.
     """
-    model, found = predict(data, muscle, ends, zero), outcomes(data)
+    moved, found = [n for n in given_with_error(data) if noise[n] > 0.0], outcomes(data)
+    many = data
+    if moved and not data.stepped:  # the set, and below it once again for each that is off
+        columns = {
+            name: np.concatenate([each, *(each + (name == n) * noise[n] for n in moved)])
+            for name, each in data.columns.items()
+        }
+        many = replace(data, columns=columns)
+    model, *others = np.split(predict(many, muscle, ends, zero), many.rows // data.rows)
+    for name in moved if data.stepped else ():
+        columns = {**data.columns, name: data.columns[name] + noise[name]}
+        others.append(predict(replace(data, columns=columns), muscle, ends, zero))
     variance = np.zeros((*model.shape, len(found)))
     for i, name in enumerate(found):
         variance[:, i, i] = noise[name] ** 2
-    for name in given_with_error(data):
-        if noise[name] > 0.0:
-            columns = {**data.columns, name: data.columns[name] + noise[name]}
-            slope = predict(replace(data, columns=columns), muscle, ends, zero) - model
-            variance += slope[:, :, None] * slope[:, None, :]
+    for other in others:
+        slope = other - model
+        variance += slope[:, :, None] * slope[:, None, :]
     factor = np.linalg.cholesky(variance)
     measured = np.stack([data.columns[name] for name in found], axis=-1)
     residual = np.linalg.solve(factor, (measured - model)[..., None])[..., 0]

@@ -1,0 +1,124 @@
+"""The study behind docs/own-muscle.md: how often the stated intervals hold, and how wide they are.
+
+    python scripts/identify_study.py --out runs/identify     goes on where it was stopped
+    python scripts/identify_study.py --out runs/identify --page
+
+Every case is a TCA drawn by its own number as seed. A bench measures it with the errors of
+``simulated_bench``; the fit starts at the thread of the catalogue, not at the truth, and knows the
+geometry. A line of ``cases.jsonl`` is one case.
+"""
+
+import argparse
+import json
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from tca_mj.files import append_whole
+from tca_mj.pages import table
+from tca_mj.tca import CATALOGUE, TcaSpec
+from tca_mj.tca.identify import constants_of, identify, simulated_bench, with_constants
+from tca_mj.tca.identify.constants import CONSTANTS
+from tca_mj.tca.identify.fit import Problem
+from tca_mj.tca.identify.constants import encoded
+
+CASES, ROWS = 200, 100
+PAGE = Path(__file__).resolve().parent.parent / "docs" / "own-muscle.md"
+_THREAD = CATALOGUE["free-stroke"]
+_PLAIN = replace(_THREAD.fibre, load_softening=(0.0, 0.0, 1.0))
+
+
+def drawn(seed: int) -> tuple[TcaSpec, TcaSpec]:
+    """A TCA, and what is known of it before it is measured."""
+    random = np.random.default_rng(seed)
+    radius, coil = random.uniform(0.12e-3, 0.3e-3), random.uniform(2.0, 3.0)
+    length, natural = random.uniform(0.1, 0.35), math.radians(random.uniform(14.0, 22.0))
+    touching = math.asin(1.0 / (math.pi * coil))
+    fibre = replace(_PLAIN, radius=radius, inserted_twist=_PLAIN.inserted_twist * 0.21e-3 / radius)
+    tca = TcaSpec(
+        fibre=fibre, fibre_length=length, coil_radius=coil * radius, pitch_angle=natural,
+        minimum_pitch_angle=min(touching, 0.8 * natural),
+    )  # fmt: skip
+    young = 1.2e9 * math.exp(random.uniform(-0.6, 0.9))
+    growth = random.uniform(0.6, 1.4)
+    tca = with_constants(tca, {
+        "young": young, "shear": young / random.uniform(3.0, 8.0),
+        "softening_rate": random.uniform(1.5e-4, 6e-4),
+        "growth_50": 0.0141 * growth, "growth_100": 0.0458 * growth * random.uniform(0.8, 1.2),
+        "resistance_per_length": random.uniform(20.0, 150.0),
+        "stretch_resistance": random.uniform(0.05, 0.3),
+        "contraction_resistance": random.uniform(0.3, 0.9),
+        "specific_heat": random.uniform(900.0, 1800.0),
+        "heat_loss": tca.heat_loss * random.uniform(0.5, 2.0), "ambient": random.uniform(18.0, 30.0),
+    })  # fmt: skip
+    start = constants_of(_THREAD) | {
+        "rest_length": tca.rest_length * random.uniform(0.95, 1.05),
+        "minimum_length": tca.minimum_length * random.uniform(0.95, 1.05),
+    }
+    known = ("fibre_length", "radius", "coil_radius", "inserted_twist", "line_density")
+    return tca, with_constants(tca, {n: v for n, v in start.items() if n not in known})
+
+
+def case(seed: int) -> dict:
+    """What the fit of one TCA says, beside the truth and the bound of Cramer and Rao."""
+    tca, start = drawn(seed)
+    truth = constants_of(tca)
+    data = simulated_bench(tca, ROWS, seed)
+    found = identify(data, start, compare=False)
+    old = found.fit.problem
+    at_truth = np.array([encoded(n, truth[n]) for n in old.names])
+    exact = Problem.of(data, tca, "rod", old.ends, old.names, {}, {})
+    slopes = exact.slopes(at_truth, np.ones(len(data)))
+    bound = np.sqrt(np.diag(np.linalg.inv(slopes.T @ slopes)))
+    rows = {}
+    for each, least in zip(found.found, bound.tolist(), strict=True):
+        size = truth[each.name] if CONSTANTS[each.name].log else 1.0
+        rows[each.name] = {
+            "truth": truth[each.name], "value": each.value, "state": each.state,
+            "interval": each.interval, "bound": least * size,
+        }  # fmt: skip
+    return {"seed": seed, "constants": rows, "scales": found.fit.scales.tolist()}
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--out", type=Path, default=Path("runs/identify"))
+    parser.add_argument("--cases", type=int, default=CASES)
+    parser.add_argument("--page", action="store_true", help="write the table into the page")
+    asked = parser.parse_args()
+    path = asked.out / "cases.jsonl"
+    asked.out.mkdir(parents=True, exist_ok=True)
+    lines = path.read_text().splitlines() if path.exists() else []
+    done = {row["seed"]: row for row in map(json.loads, lines)}
+    for seed in range(asked.cases):
+        if seed not in done:
+            try:
+                done[seed] = case(seed)
+            except Exception as e:
+                print(seed, repr(e)[:300]); continue
+            append_whole(path, (json.dumps(done[seed]) + "\n").encode())
+    print("\n".join(summary([done[seed] for seed in sorted(done)])))
+
+
+def summary(cases: list[dict]) -> list[str]:
+    rows = []
+    for name in cases[0]["constants"]:
+        every = [each["constants"][name] for each in cases]
+        good = [each for each in every if each["state"] == "identified"]
+        inside = [each["interval"][0] <= each["truth"] <= each["interval"][1] for each in good]
+        wide = [(each["interval"][1] - each["interval"][0]) / (2 * 1.96 * each["bound"])
+                for each in good]
+        size = [each["bound"] / abs(each["truth"]) for each in good]
+        rows.append([
+            f"`{name}`", f"{len(good)} of {len(every)}",
+            f"{100 * np.mean(inside):.1f} %" if good else "", 
+            f"{100 * np.median(size):.2g} %" if good else "",
+            f"{np.median(wide):.2f}, {max(wide):.2f}" if good else "",
+        ])  # fmt: skip
+    return table(["constant", "identified", "within 95 %", "error", "width over bound: median, largest"], rows)
+
+
+if __name__ == "__main__":
+    main()
