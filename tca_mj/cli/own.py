@@ -25,8 +25,9 @@ def add_commands(commands: Commands) -> None:
         metavar="NAME=VALUE")  # fmt: skip
     add(identify, "--law", "the model; default rod, which simulations use", default="rod",
         choices=["rod", "love", "cst", "linear"])  # fmt: skip
-    add(identify, "--ends", "whether an end may spin, in files that do not say so; default: the"
-        " data are asked", choices=["free", "locked"])  # fmt: skip
+    add(identify, "--ends", "whether an end may spin, in files that do not say so; usual is free"
+        " where a load hangs and locked where a force is read; default: the data are asked",
+        choices=["free", "locked", "usual"])  # fmt: skip
     add(identify, "--held-out", "CSV files that are not fitted but judged", nargs="+", type=Path,
         default=[], metavar="DATA")  # fmt: skip
     add(identify, "--no-compare", "do not fit the other models", action="store_false",

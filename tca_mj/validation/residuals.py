@@ -40,8 +40,9 @@ def _fill(figure: Any, data: Data, known: Any) -> None:
         above.plot(x, each.measured, ".", color=_DOT, ms=3, label="measured")
         # Under several loads there are several curves: dots as well.
         above.plot(x[order], each.expected[order], ".", color=_LINE, ms=1.5, label="expected")
-        above.errorbar(x[order], each.expected[order], 1.96 * each.error[order], fmt="none",
-                       ecolor=_LINE, alpha=0.15, label="95 %")  # fmt: skip
+        band = 1.96 * each.error
+        above.vlines(x, each.expected - band, each.expected + band, color=_LINE, alpha=0.12, lw=1,
+                     label="95 %")  # fmt: skip
         above.set(ylabel=f"{each.outcome} [{SHOWN[each.outcome]}]", title=data.name)
         below.plot(x, (each.measured - each.expected) / each.error, ".", color=_DOT, ms=3)
         for level in (-1.96, 1.96):

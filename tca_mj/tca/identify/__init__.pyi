@@ -3,6 +3,7 @@ from tca_mj.tca.identify.constants import CONSTANTS, Constant, constants_of, wit
 from tca_mj.tca.identify.data import Data, read_data, write_data
 from tca_mj.tca.identify.identified import (
     Compared,
+    Ends,
     Found,
     Identification,
     Prediction,
@@ -11,7 +12,7 @@ from tca_mj.tca.identify.identified import (
 from tca_mj.tca.identify.reporting import report, sources, write_identification
 
 __all__ = [
-    "CONSTANTS", "Compared", "Constant", "Data", "Found", "Identification", "Prediction",
+    "CONSTANTS", "Compared", "Constant", "Data", "Ends", "Found", "Identification", "Prediction",
     "constants_of", "identify", "read_data", "report", "simulated_bench", "sources",
     "with_constants", "write_data", "write_identification",
 ]  # fmt: skip

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from functools import partial
+from typing import Annotated
 
 import numpy as np
 
-from tca_mj.checks import Count, Seed, door
+from tca_mj.checks import Seed, door, whole
 from tca_mj.tca.identify.data import Data
 from tca_mj.tca.identify.predict import (
     Muscle,
@@ -20,11 +22,12 @@ from tca_mj.tca.laws.coil import Spin
 from tca_mj.tca.laws.statics import tension
 from tca_mj.tca.spec import TcaSpec
 
+Rows = Annotated[int, partial(whole, at_least=3, at_most=100_000)]
 _HOT = 110.0  # above the reference, how far a bench heats [K]
 
 
 @door
-def simulated_bench(tca: TcaSpec, rows: Count = 200, seed: Seed = 0) -> list[Data]:
+def simulated_bench(tca: TcaSpec, rows: Rows = 200, seed: Seed = 0) -> list[Data]:
     """Five sets of measurements of a TCA, with the errors of simple instruments.
 
     Lengths and forces are off by 1 % of full scale (the largest value), temperatures by 0.5 K,

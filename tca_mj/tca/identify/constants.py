@@ -19,8 +19,7 @@ from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Any
 
-import numpy as np
-
+from tca_mj.checks import Finite, door, require_one_of
 from tca_mj.tca.spec import FibreSpec, TcaSpec
 
 _FORCE_COLD = "force against stretch to half as long again or more, cold, or loads hung on it"
@@ -108,6 +107,7 @@ _OWN = ("resistance_per_length", "stretch_resistance", "contraction_resistance",
 _BODY = {"body_conductance": "conductance", "body_capacity": "capacity", "body_loss": "loss"}
 
 
+@door
 def constants_of(tca: TcaSpec) -> dict[str, float]:
     """The constants that a TCA has; those of a body only if it lies in one."""
     a2, a1 = tca.fibre.growth
@@ -120,14 +120,17 @@ def constants_of(tca: TcaSpec) -> dict[str, float]:
     return {name: found[name] for name in CONSTANTS if name in found}
 
 
-def with_constants(tca: TcaSpec, values: Mapping[str, float]) -> TcaSpec:
+@door
+def with_constants(tca: TcaSpec, values: Mapping[str, Finite]) -> TcaSpec:
     """The same TCA with some constants changed; what is not named stays, bit for bit.
 
     Another natural length keeps the turns, unless the coil's radius is changed, too.
 
     Raises:
-        ValueError: If there is no such TCA.
+        ValueError: If there is no such constant or no such TCA.
     """
+    for name in values:
+        require_one_of("name of a constant", name, tuple(CONSTANTS))
     fibre: dict[str, Any] = {name: values[name] for name in _FIBRE if name in values}
     if "softening_rate" in values:
         fibre["softening"] = values["softening_rate"] * tca.fibre.filament_young
@@ -182,5 +185,5 @@ def encoded(name: str, value: float) -> float:
 
 
 def decoded(name: str, number: float) -> float:
-    """The constant for a number that was fitted."""
-    return float(np.exp(number)) if known_of(name).log else number
+    """The constant for a number that was fitted; OverflowError if there is none."""
+    return math.exp(number) if known_of(name).log else number

@@ -20,6 +20,7 @@ from typing import Any, get_args
 import numpy as np
 
 from tca_mj.checks import Array, door, require_one_of, shown
+from tca_mj.files import write_whole
 from tca_mj.hints import nearest
 from tca_mj.tca.arrays import frozen
 from tca_mj.tca.dynamics.loads import GRAVITY
@@ -57,6 +58,7 @@ _STRESS = 5e8  # shear in a fibre that no polymer bears, an estimate [Pa]
 _LEFT_OUT = 0.1  # share of rows beyond what can be, up to which they are left out
 _GAP = 5.0  # times the median step
 _MOST = 100_000  # rows of one file
+_LARGEST = 2**25  # bytes of one file
 
 
 @dataclass(frozen=True, kw_only=True, slots=True, eq=False)
@@ -87,17 +89,19 @@ class Data:
         """Whether this is a course over time under a voltage, current or power."""
         return "time" in self.columns and any(name in self.columns for name in DRIVES)
 
+    @door
     def given(self, name: str) -> Any:
         """A quantity, column or fixed; None if it is neither."""
         return self.columns.get(name, self.fixed.get(name))
 
+    @door
     def noted(self, note: str) -> Data:
         """The same with one more note."""
         return replace(self, notes=(*self.notes, f"{self.name}: {note}"))
 
 
 @door
-def read_data(path: Path, tca: TcaSpec) -> Data:
+def read_data(path: str | Path, tca: TcaSpec) -> Data:
     """Reads one set of measurements.
 
     Separators are commas, semicolons or tabs; with the last two a decimal comma is understood.
@@ -112,8 +116,10 @@ def read_data(path: Path, tca: TcaSpec) -> Data:
             condition is unknown, or more than a tenth of a column's numbers are impossible.
         OSError: If it cannot be read.
     """
+    path = Path(path)
     try:
-        text = path.read_bytes().decode("utf-8-sig")
+        with path.open("rb") as file:
+            text = file.read(_LARGEST).decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise ValueError(f"{path.name} must be text in UTF-8, got {error}") from error
     lines = text.splitlines()
@@ -144,7 +150,7 @@ def read_data(path: Path, tca: TcaSpec) -> Data:
 
 
 @door
-def write_data(data: Data, path: Path) -> Path:
+def write_data(data: Data, path: str | Path) -> Path:
     """Writes measurements as ``read_data`` reads them, every digit kept.
 
     Returns:
@@ -153,14 +159,12 @@ def write_data(data: Data, path: Path) -> Path:
     Raises:
         OSError: If it cannot be written.
     """
-    from tca_mj.files import write_whole
-
     said = [f"# {name} [{SHOWN[name]}]: {value!r}" for name, value in data.fixed.items()]
     said += [f"# ends: {data.ends}"] if data.ends else []
     said.append(",".join(f"{name} [{SHOWN[name]}]" for name in data.columns))
     rows = zip(*(each.tolist() for each in data.columns.values()), strict=True)
     said += [",".join(map(repr, row)) for row in rows]
-    return write_whole(path, ("\n".join(said) + "\n").encode())
+    return write_whole(Path(path), ("\n".join(said) + "\n").encode())
 
 
 def _lines_above(
@@ -265,7 +269,8 @@ def _bounds(tca: TcaSpec) -> dict[str, tuple[float, float]]:
 def _possible(data: Data, rows: Array, tca: TcaSpec, units: Mapping[str, str]) -> Data:
     """Leaves out single rows with what cannot be; refuses columns of it."""
     bounds, good = _bounds(tca), np.ones(data.rows, dtype=bool)
-    for name, values in (*data.columns.items(), *data.fixed.items()):
+    every: dict[str, Any] = {**data.fixed, **data.columns}
+    for name, values in every.items():
         low, high = bounds[name]
         inside = np.atleast_1d((values >= low) & (values <= high))
         if np.mean(~inside) > _LEFT_OUT:

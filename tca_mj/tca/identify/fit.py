@@ -265,7 +265,7 @@ def fitted(problem: Problem, start: Array | None = None) -> Fit:
         if settled:
             break
     slopes = problem.slopes(x, scales)
-    covariance = np.linalg.inv(slopes.T @ slopes)
+    covariance: Array = np.linalg.inv(slopes.T @ slopes)
     freedom = max(problem.size - len(x), 1)
     return Fit(problem, x, covariance, pure, scales, slopes, float(student.ppf(0.975, freedom)))
 
@@ -288,7 +288,7 @@ def _order(data: Data) -> Array:
     by = "time" if data.stepped else next(
         (n for n in ("temperature", "length", "stretch", "displacement", "load")
          if n in data.columns and np.ptp(data.columns[n]) > 0.0), "")  # fmt: skip
-    return data.columns[by] if by else np.arange(data.rows)
+    return data.columns[by] if by else np.arange(float(data.rows))
 
 
 def _fewer(residual: Array) -> float:

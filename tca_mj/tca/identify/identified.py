@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from typing import NamedTuple, get_args
+from typing import Literal, NamedTuple, get_args
 
 import numpy as np
 
@@ -41,6 +41,10 @@ _STEP = 1e-4  # of differences, over the width
 _NORMAL = 1.959964  # 97.5 % of the normal distribution
 
 
+Ends = Literal["free", "locked", "usual"]
+"""Of all sets, or as usual: an end spins where a load hangs, none does where a force is read."""
+
+
 class Found(NamedTuple):
     """One constant after the fit.
 
@@ -67,13 +71,13 @@ class Compared(NamedTuple):
 
     Attributes:
         law: "rod", "love", "cst" or "linear".
-        ends: Of the sets that do not say theirs; None if all do.
+        ends: Of the sets that do not say theirs, one of ``Ends``; None if all do.
         criterion: Akaike's criterion above the best.
         misfit: Largest ratio of residuals to stated errors in a set with lengths or forces.
     """
 
     law: Law
-    ends: Spin | None
+    ends: Ends | None
     criterion: float
     misfit: float
 
@@ -107,7 +111,7 @@ class Identification:
     Attributes:
         tca: The TCA.
         law: The law that was fitted.
-        ends: End condition of the sets that do not say theirs; None if all do.
+        ends: End condition of the sets that do not say theirs, one of ``Ends``; None if all do.
         found: The constants that were free.
         compared: Models and end conditions, the best first; empty if they were not compared.
         words: What it comes to, in sentences.
@@ -117,7 +121,7 @@ class Identification:
 
     tca: TcaSpec
     law: Law
-    ends: Spin | None
+    ends: Ends | None
     found: tuple[Found, ...]
     compared: tuple[Compared, ...]
     words: tuple[str, ...]
@@ -135,6 +139,7 @@ class Identification:
         n, size = len(self.found), self.fit.deviations
         return (self.fit.covariance / np.outer(size, size))[:n, :n]
 
+    @door
     def predict(self, data: Data) -> tuple[Prediction, ...]:
         """What is expected of a set of measurements, also of one that was held out.
 
@@ -152,7 +157,7 @@ class Identification:
         more = [n for n in _asked(self.tca, None) if affects(n, data) and n not in old.names]
         beyond = [Known(n, encoded(n, values[n]), CONSTANTS[n].width) for n in more]
         problem = replace(
-            old, data=(data,), ends=(data.ends or self.ends or "locked",),
+            old, data=(data,), ends=(_ends_of(data, self.ends),),
             known=(*old.known, *beyond), noise=(noise_of(data, self.noise),),
         )  # fmt: skip
         x = np.append(fit.x, [each.start for each in beyond])
@@ -188,7 +193,7 @@ def identify(
     free: Sequence[str] | None = None,
     errors: Mapping[str, Positive] | None = None,
     law: Law = "rod",
-    ends: Spin | None = None,
+    ends: Ends | None = None,
     noise: Mapping[str, NotNegative] | None = None,
     compare: bool = True,
 ) -> Identification:
@@ -203,7 +208,8 @@ def identify(
         errors: Standard errors of constants that were measured, in their units: these are fitted,
             too, within that error, so that it counts in all others.
         law: The model, "rod" (which simulations use), "love", "cst" or "linear".
-        ends: Whether an end may spin, in the sets that do not say so; None to ask the data.
+        ends: Whether an end may spin, in the sets that do not say so: in all, in none, or as
+            usual; None to ask the data.
         noise: Standard deviations of what was measured, by quantity in SI units; default 0.5 K,
             1 % of full scale (the largest value) for all else, 0 for loads.
         compare: Whether to fit all other models and end conditions, too.
@@ -224,24 +230,28 @@ def identify(
         )
     sets = [assumed(each, tca) for each in data]
 
-    def fit_of(of: Law, at: Spin | None) -> Fit:
-        every = [each.ends or at or "locked" for each in sets]
+    def fit_of(of: Law, at: Ends | None, start: Array | None = None) -> Fit:
+        every = [_ends_of(each, at) for each in sets]
         problem = Problem.of(sets, tca, of, every, asked, known, stated)
         if not problem.known:
             raise ValueError(f"free must name constants that the data concern, got {asked}")
-        return fitted(problem)
+        return fitted(problem, start)
 
     mechanical = [d for d in sets if {*LENGTHS, "force"} & set(outcomes(d))]
-    open_ends = ends is None and any(each.ends is None for each in mechanical)
-    choices: list[Spin | None] = ["free", "locked"] if open_ends else [ends]
-    fits = {(law, at): fit_of(law, at) for at in choices}
+    choices: list[Ends | None] = [ends]
+    if ends is None and any(each.ends is None for each in mechanical):
+        different = {tuple(_ends_of(d, at) for d in mechanical): at for at in get_args(Ends)}
+        choices = [*different.values()]
+    fits: dict[tuple[Law, Ends | None], Fit] = {}
+    for at in choices:
+        start = next(iter(fits.values())).x if fits else None
+        fits[law, at] = fit_of(law, at, start)
     best = min(fits, key=lambda each: fits[each].criterion)
-    if compare and mechanical:
-        for other in get_args(Law):
-            for at in choices[:1] if other == "linear" else choices:
-                if (other, at) not in fits:
-                    with suppress(ValueError, ArithmeticError):  # no such shape in this model
-                        fits[other, at] = fit_of(other, at)
+    for other in get_args(Law) if compare and mechanical else ():
+        if other != law:
+            alike = "linear" not in (law, other)
+            with suppress(ValueError, ArithmeticError):  # a model may have no such shape
+                fits[other, best[1]] = fit_of(other, best[1], fits[best].x if alike else None)
     fit, compared = fits[best], _compared(fits)
     found = tuple(_found(fit))
     values = {each.name: each.value for each in found}
@@ -255,6 +265,15 @@ def identify(
         spec = replace(spec, fibre=measured)
     words = tuple(_words(fit, found, compared, best, _asked(tca, free)))
     return Identification(spec, law, best[1], found, compared, words, fit, stated)
+
+
+def _ends_of(data: Data, ends: Ends | None) -> Spin:
+    """End condition of a set: its own, else the chosen one."""
+    if data.ends or ends is None:
+        return data.ends or "locked"
+    if ends == "usual":
+        return "locked" if "force" in outcomes(data) else "free"
+    return ends
 
 
 def _asked(tca: TcaSpec, free: Sequence[str] | None) -> list[str]:
@@ -274,7 +293,7 @@ def _extremes(data: Data) -> list[float]:
     return [] if found is None else [float(np.min(found)), float(np.max(found))]
 
 
-def _compared(fits: Mapping[tuple[Law, Spin | None], Fit]) -> tuple[Compared, ...]:
+def _compared(fits: Mapping[tuple[Law, Ends | None], Fit]) -> tuple[Compared, ...]:
     least = min(fit.criterion for fit in fits.values())
     rows = [Compared(*key, fit.criterion - least, _misfit(fit)) for key, fit in fits.items()]
     return tuple(sorted(rows, key=lambda row: row.criterion))
@@ -310,7 +329,7 @@ def _found(fit: Fit) -> list[Found]:
 
 def _words(
     fit: Fit, found: Sequence[Found], compared: Sequence[Compared],
-    best: tuple[Law, Spin | None], asked: Sequence[str],
+    best: tuple[Law, Ends | None], asked: Sequence[str],
 ) -> list[str]:  # fmt: skip
     """What it comes to."""
     good = [each.name for each in found if each.state == "identified"]
@@ -357,14 +376,15 @@ def _combinations(fit: Fit, names: Sequence[str]) -> list[str]:
     return found
 
 
-def _verdict(compared: Sequence[Compared], best: tuple[Law, Spin | None]) -> list[str]:
+def _verdict(compared: Sequence[Compared], best: tuple[Law, Ends | None]) -> list[str]:
     """Which models the data support."""
     if len(compared) < 2:
         return []
 
     def named(each: Compared) -> str:
-        ends = "" if each.ends is None or each.law == "linear" else f" with {each.ends} ends"
-        return f"{each.law}{ends}"
+        at_ends = {"usual": ", ends free where it hangs and locked where it pulls",
+                   "free": " with free ends", "locked": " with locked ends"}  # fmt: skip
+        return each.law + ("" if each.law == "linear" else at_ends.get(each.ends or "", ""))
 
     first = compared[0]
     even = [named(each) for each in compared[1:] if each.criterion <= _EVEN]

@@ -32,8 +32,8 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from tca_mj.checks import Array
-from tca_mj.tca.identify.data import DRIVES, Data
+from tca_mj.checks import Array, number, require_one_of, within
+from tca_mj.tca.identify.data import DRIVES, UNITS, Data
 from tca_mj.tca.laws.coil import Spin
 from tca_mj.tca.laws.statics import hanging_length, tension
 from tca_mj.tca.sensing.wire import WireTable, resistance
@@ -138,8 +138,14 @@ def assumed(data: Data, tca: TcaSpec) -> Data:
     """The set with a note on everything that it does not say and that is assumed.
 
     Raises:
-        ValueError: If nothing can be predicted, or what is given is missing.
+        ValueError: If nothing can be predicted, or what is given is missing or no number.
     """
+    for quantity, values in data.columns.items():
+        require_one_of("quantity", quantity, tuple(UNITS))
+        within(quantity, values, shape=(data.rows,))
+    for quantity, value in data.fixed.items():
+        require_one_of("quantity", quantity, tuple(UNITS))
+        number(quantity, value)
     held, name = length_is_given(data), length_name(data)
     if not outcomes(data):
         raise ValueError(
@@ -234,9 +240,9 @@ def weighed(
     for other in others:
         slope = other - model
         variance += slope[:, :, None] * slope[:, None, :]
-    factor = np.linalg.cholesky(variance)
+    factor: Array = np.linalg.cholesky(variance)
     measured = np.stack([data.columns[name] for name in found], axis=-1)
-    residual = np.linalg.solve(factor, (measured - model)[..., None])[..., 0]
+    residual: Array = np.linalg.solve(factor, (measured - model)[..., None])[..., 0]
     return model, residual, np.sqrt(np.diagonal(variance, axis1=1, axis2=2))
 
 
