@@ -16,16 +16,16 @@ from pathlib import Path
 
 import numpy as np
 
-from tca_mj.files import append_whole
+from tca_mj.files import append_whole, write_whole
 from tca_mj.pages import table
 from tca_mj.tca import CATALOGUE, TcaSpec
 from tca_mj.tca.identify import constants_of, identify, simulated_bench, with_constants
-from tca_mj.tca.identify.constants import CONSTANTS
+from tca_mj.tca.identify.constants import CONSTANTS, encoded
 from tca_mj.tca.identify.fit import Problem
-from tca_mj.tca.identify.constants import encoded
 
 CASES, ROWS = 200, 100
 PAGE = Path(__file__).resolve().parent.parent / "docs" / "own-muscle.md"
+MARK, END = "<!-- identify_study -->", "<!-- end -->"
 _THREAD = CATALOGUE["free-stroke"]
 _PLAIN = replace(_THREAD.fibre, load_softening=(0.0, 0.0, 1.0))
 
@@ -37,8 +37,8 @@ def drawn(seed: int) -> tuple[TcaSpec, TcaSpec]:
     length, natural = random.uniform(0.1, 0.35), math.radians(random.uniform(14.0, 22.0))
     touching = math.asin(1.0 / (math.pi * coil))
     fibre = replace(_PLAIN, radius=radius, inserted_twist=_PLAIN.inserted_twist * 0.21e-3 / radius)
-    tca = TcaSpec(
-        fibre=fibre, fibre_length=length, coil_radius=coil * radius, pitch_angle=natural,
+    tca = replace(
+        _THREAD, fibre=fibre, fibre_length=length, coil_radius=coil * radius, pitch_angle=natural,
         minimum_pitch_angle=min(touching, 0.8 * natural),
     )  # fmt: skip
     young = 1.2e9 * math.exp(random.uniform(-0.6, 0.9))
@@ -51,7 +51,8 @@ def drawn(seed: int) -> tuple[TcaSpec, TcaSpec]:
         "stretch_resistance": random.uniform(0.05, 0.3),
         "contraction_resistance": random.uniform(0.3, 0.9),
         "specific_heat": random.uniform(900.0, 1800.0),
-        "heat_loss": tca.heat_loss * random.uniform(0.5, 2.0), "ambient": random.uniform(18.0, 30.0),
+        "heat_loss": tca.heat_loss * random.uniform(0.5, 2.0),
+        "ambient": random.uniform(18.0, 30.0),
     })  # fmt: skip
     start = constants_of(_THREAD) | {
         "rest_length": tca.rest_length * random.uniform(0.95, 1.05),
@@ -82,7 +83,31 @@ def case(seed: int) -> dict:
     return {"seed": seed, "constants": rows, "scales": found.fit.scales.tolist()}
 
 
+def summary(cases: list[dict]) -> list[str]:
+    """The table of the page: a row for each constant, then all together."""
+
+    def row(name: str, every: list[dict]) -> list[str]:
+        good = [each for each in every if each["state"] == "identified"]
+        if not good:
+            return [name, f"0 of {len(every)}", "", "", "", ""]
+        inside = [each["interval"][0] <= each["truth"] <= each["interval"][1] for each in good]
+        wide = [(each["interval"][1] - each["interval"][0]) / (3.92 * each["bound"])
+                for each in good]  # fmt: skip
+        size = [each["bound"] / abs(each["truth"]) for each in good]
+        return [name, f"{len(good)} of {len(every)}", f"{100.0 * np.mean(inside):.1f} %",
+                f"{100.0 * np.median(size):.2g} %", f"{np.median(wide):.2f}",
+                f"{max(wide):.2f}"]  # fmt: skip
+
+    names = list(cases[0]["constants"])
+    found = {name: [each["constants"][name] for each in cases] for name in names}
+    heads = ["constant", "identified", "truth inside", "error, median", "width over bound, median",
+             "largest"]  # fmt: skip
+    rows = [row(f"`{name}`", every) for name, every in found.items()]
+    return table(heads, [*rows, row("all", [each for every in found.values() for each in every])])
+
+
 def main() -> None:
+    """Goes on with the cases, and prints the table or writes it into the page."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--out", type=Path, default=Path("runs/identify"))
     parser.add_argument("--cases", type=int, default=CASES)
@@ -91,33 +116,17 @@ def main() -> None:
     path = asked.out / "cases.jsonl"
     asked.out.mkdir(parents=True, exist_ok=True)
     lines = path.read_text().splitlines() if path.exists() else []
-    done = {row["seed"]: row for row in map(json.loads, lines)}
+    done = {each["seed"]: each for each in map(json.loads, lines)}
     for seed in range(asked.cases):
         if seed not in done:
-            try:
-                done[seed] = case(seed)
-            except Exception as e:
-                print(seed, repr(e)[:300]); continue
+            done[seed] = case(seed)
             append_whole(path, (json.dumps(done[seed]) + "\n").encode())
-    print("\n".join(summary([done[seed] for seed in sorted(done)])))
-
-
-def summary(cases: list[dict]) -> list[str]:
-    rows = []
-    for name in cases[0]["constants"]:
-        every = [each["constants"][name] for each in cases]
-        good = [each for each in every if each["state"] == "identified"]
-        inside = [each["interval"][0] <= each["truth"] <= each["interval"][1] for each in good]
-        wide = [(each["interval"][1] - each["interval"][0]) / (2 * 1.96 * each["bound"])
-                for each in good]
-        size = [each["bound"] / abs(each["truth"]) for each in good]
-        rows.append([
-            f"`{name}`", f"{len(good)} of {len(every)}",
-            f"{100 * np.mean(inside):.1f} %" if good else "", 
-            f"{100 * np.median(size):.2g} %" if good else "",
-            f"{np.median(wide):.2f}, {max(wide):.2f}" if good else "",
-        ])  # fmt: skip
-    return table(["constant", "identified", "within 95 %", "error", "width over bound: median, largest"], rows)
+    text = "\n".join(summary([done[seed] for seed in sorted(done)][: asked.cases]))
+    print(text)
+    if asked.page:
+        before, _, rest = PAGE.read_text(encoding="utf-8").partition(MARK)
+        _, _, after = rest.partition(END)
+        write_whole(PAGE, f"{before}{MARK}\n{text}\n{END}{after}".encode())
 
 
 if __name__ == "__main__":

@@ -38,6 +38,7 @@ class Constant:
             a temperature, of itself [K]. Estimates.
         own: Whether it is fitted without being asked for.
         log: Whether it is fitted as a logarithm.
+        usual: Where a fit starts if the TCA says 0; estimates.
     """
 
     unit: str
@@ -46,6 +47,7 @@ class Constant:
     width: float = 1.0
     own: bool = True
     log: bool = True
+    usual: float = 0.0
 
 
 CONSTANTS: Mapping[str, Constant] = MappingProxyType({
@@ -59,7 +61,8 @@ CONSTANTS: Mapping[str, Constant] = MappingProxyType({
     "shear": Constant("Pa", "shear modulus", _FORCE_COLD),
     "softening_rate": Constant(
         "1/K", "relative fall of both moduli per kelvin",
-        "length against temperature under two or three loads, or force at two fixed lengths"),
+        "length against temperature under two or three loads, or force at two fixed lengths",
+        usual=3e-4),
     "growth_50": Constant(
         "1", "growth of the fibre's radius 50 K above the reference, by its product with the"
         " inserted twist", "length against temperature from cold to hot, or force at a length"),
@@ -69,10 +72,10 @@ CONSTANTS: Mapping[str, Constant] = MappingProxyType({
         "ohm/m", "resistance per natural length", "resistance against length"),
     "stretch_resistance": Constant(
         "1", "fall of the resistance per strain beyond the natural length",
-        "resistance against length beyond the natural one"),
+        "resistance against length beyond the natural one", usual=0.15),
     "contraction_resistance": Constant(
         "1", "rise of the resistance per contraction below the natural length",
-        "resistance against length below the natural one"),
+        "resistance against length below the natural one", usual=0.5),
     "specific_heat": Constant(
         "J/(kg K)", "heat capacity per mass, by its product with the mass", _STEP),
     "heat_loss": Constant("W/(m K)", "heat lost to the air per length of fibre", _STEP),
@@ -140,8 +143,10 @@ def with_constants(tca: TcaSpec, values: Mapping[str, Finite]) -> TcaSpec:
     shaped = {"rest_length", "minimum_length", "fibre_length"} & set(values)
     if shaped:
         long = values.get("fibre_length", tca.fibre_length)
-        rest = values.get("rest_length", tca.rest_length) / long
-        touching = values.get("minimum_length", tca.minimum_length) / long
+        along = values.get("rest_length", tca.rest_length) / math.cos(tca.lay_angle)
+        wound = along * math.sin(tca.lay_angle)
+        shortest = values.get("minimum_length", tca.minimum_length)
+        rest, touching = along / long, math.hypot(shortest, wound) / long
         if not 0.0 < touching < rest < 1.0:
             raise ValueError(
                 "minimum_length and rest_length over fibre_length must rise from 0 to 1, got"
@@ -179,6 +184,7 @@ def encoded(name: str, value: float) -> float:
     """
     if not known_of(name).log:
         return value
+    value = value or known_of(name).usual
     if not value > 0.0:
         raise ValueError(f"{name} must be above 0 where the fit starts, got {value}")
     return math.log(value)

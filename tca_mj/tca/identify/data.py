@@ -55,6 +55,7 @@ SHOWN = {"time": "s", "voltage": "V", "current": "A", "power": "W", "temperature
 _HEAD = re.compile(r"\s*([^\[(]*?)\s*[\[(]\s*(.*?)\s*[\])]\s*")
 _LINE = re.compile(r"#\s*([^:=]+?)\s*[:=]\s*(.*)")
 _STRESS = 5e8  # shear in a fibre that no polymer bears, an estimate [Pa]
+_FREEZING = 4.0  # [°C]
 _LEFT_OUT = 0.1  # share of rows beyond what can be, up to which they are left out
 _GAP = 5.0  # times the median step
 _MOST = 100_000  # rows of one file
@@ -303,15 +304,20 @@ def _meant(
         return (data.columns[column] + shift) / UNITS[column][units[column]]
 
     if name in data.columns:
+        others = [
+            other for other in data.columns
+            if other != name and fits(_converted(name, units[name], raw(other)), name)
+            and fits(_converted(other, units[other], raw(name)), other)
+        ]  # fmt: skip
+        # Swapped first where the other column is odd, too: no bench is freezing.
+        cold = [n for n in others if n == "temperature" and np.median(data.columns[n]) < _FREEZING]
+        if cold:
+            return f"; are the columns {name} and {cold[0]} swapped?"
         for unit in UNITS[name]:
             if fits(_converted(name, unit, raw(name)), name):
                 return f"; did you mean [{unit}]?"
-        for other in data.columns:
-            here, there = units[name], units[other]
-            if other != name and fits(_converted(name, here, raw(other)), name) and (
-                fits(_converted(other, there, raw(name)), other)
-            ):
-                return f"; are the columns {name} and {other} swapped?"
+        if others:
+            return f"; are the columns {name} and {others[0]} swapped?"
     return ""
 
 

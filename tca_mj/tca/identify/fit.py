@@ -21,6 +21,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.optimize import least_squares
 from scipy.stats import t as student
 
@@ -278,17 +279,19 @@ def _scales(problem: Problem, x: Array) -> tuple[Array, Array]:
         _, residual, _ = problem.one(i, x, muscle)
         found = math.sqrt(float(np.mean(residual**2)) / (1.0 - share))
         pure.append(max(found, 1e-6))
-        ordered = residual[np.argsort(_order(data), kind="stable")]
+        ordered = residual[_order(data)]
         grown.append(pure[-1] * math.sqrt(max(map(_fewer, ordered.T))))
     return np.array(pure), np.array(grown)
 
 
-def _order(data: Data) -> Array:
-    """By what the rows of a set stand side by side."""
-    by = "time" if data.stepped else next(
-        (n for n in ("temperature", "length", "stretch", "displacement", "load")
-         if n in data.columns and np.ptp(data.columns[n]) > 0.0), "")  # fmt: skip
-    return data.columns[by] if by else np.arange(float(data.rows))
+def _order(data: Data) -> NDArray[np.int64]:
+    """The rows of a set side by side: over time, or under each load by what was varied."""
+    if data.stepped:
+        return np.argsort(data.columns["time"], kind="stable")
+    by = ("temperature", "length", "stretch", "displacement")
+    uneven = [n for n in by if n in data.columns and np.ptp(data.columns[n]) > 0.0][:1]
+    keys = [data.columns[n] for n in (*uneven, "load") if n in data.columns]
+    return np.lexsort(keys) if keys else np.arange(data.rows)
 
 
 def _fewer(residual: Array) -> float:
