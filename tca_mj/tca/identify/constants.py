@@ -38,7 +38,8 @@ class Constant:
             a temperature, of itself [K]. Estimates.
         own: Whether it is fitted without being asked for.
         log: Whether it is fitted as a logarithm.
-        usual: Where a fit starts if the TCA says 0; estimates.
+        usual: Of one that may be 0, its size: where a fit starts if the TCA says 0, and what it is
+            measured against. Estimates.
     """
 
     unit: str

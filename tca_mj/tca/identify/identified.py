@@ -306,15 +306,12 @@ def _misfit(fit: Fit) -> float:
 
 def _found(fit: Fit) -> list[Found]:
     found, errors = [], natural(fit)
-    for known, x, left in zip(
-        fit.problem.known, fit.x.tolist(), (fit.deviations / fit.problem.widths).tolist(),
-        strict=True,
-    ):  # fmt: skip
+    for known, x in zip(fit.problem.known, fit.x.tolist(), strict=True):
         name = known.name
         if name not in errors:
             continue
         stated = known.width < 0.5 * known_of(name).width
-        good = left <= (_MEASURED if stated else SHARE)
+        good = fit.left(name) <= (_MEASURED if stated else SHARE)
         state = "identified" if good else "stated" if stated else "not identified"
         interval = None
         if state != "not identified":
