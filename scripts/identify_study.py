@@ -1,4 +1,4 @@
-"""The study behind docs/own-muscle.md: how often the stated intervals hold, and how wide they are.
+"""The study behind docs/identification.md: how often stated intervals hold, and how wide they are.
 
     python scripts/identify_study.py --out runs/identify     goes on where it was stopped
     python scripts/identify_study.py --out runs/identify --page
@@ -21,11 +21,14 @@ from tca_mj.pages import table
 from tca_mj.tca import CATALOGUE, TcaSpec
 from tca_mj.tca.identify import constants_of, identify, simulated_bench, with_constants
 from tca_mj.tca.identify.constants import CONSTANTS, encoded
-from tca_mj.tca.identify.fit import Problem
+from tca_mj.tca.identify.fit import SHARE, Problem
+from tca_mj.tca.identify.predict import outcomes
+from tca_mj.validation.residuals import residuals_picture
 
 CASES, ROWS = 200, 100
-PAGE = Path(__file__).resolve().parent.parent / "docs" / "own-muscle.md"
-MARK, END = "<!-- identify_study -->", "<!-- end -->"
+DOCS = Path(__file__).resolve().parent.parent / "docs"
+HELD, GAINS, END = "<!-- intervals -->", "<!-- gains -->", "<!-- end -->"
+ORDER = ("stretch.csv", "length.csv", "force.csv", "step.csv", "resistance.csv")
 _THREAD = CATALOGUE["free-stroke"]
 _PLAIN = replace(_THREAD.fibre, load_softening=(0.0, 0.0, 1.0))
 
@@ -106,12 +109,58 @@ def summary(cases: list[dict]) -> list[str]:
     return table(heads, [*rows, row("all", [each for every in found.values() for each in every])])
 
 
+def gains() -> list[str]:
+    """Errors of the constants of the catalogue's coil as file is added to file, by the bound."""
+    tca = replace(_THREAD, fibre=_PLAIN)
+    data = simulated_bench(tca, ROWS, 0)
+    names = [name for name in constants_of(tca) if CONSTANTS[name].own]
+    ends = [each.ends or "locked" for each in data]
+    problem = Problem.of(data, tca, "rod", ends, names, {}, {})
+    slopes = problem.slopes(problem.start, np.ones(len(data)))
+    sizes = [each.rows * len(outcomes(each)) for each in data]
+    parts = dict(zip([each.name for each in data], np.split(slopes, np.cumsum(sizes)),
+                     strict=False))  # fmt: skip
+    before = slopes[problem.size :]
+    columns = []
+    for i in range(len(ORDER)):
+        rows = np.concatenate([*(parts[name] for name in ORDER[: i + 1]), before])
+        left = np.sqrt(np.diag(np.linalg.inv(rows.T @ rows)))
+        columns.append([
+            "" if error > SHARE * CONSTANTS[name].width
+            else f"{100.0 * error:.2g} %" if CONSTANTS[name].log else f"{error:.2g} K"
+            for name, error in zip(names, left, strict=True)
+        ])  # fmt: skip
+    heads = ["constant", f"`{ORDER[0]}`", *(f"and `{name}`" for name in ORDER[1:])]
+    return table(heads, [[f"`{name}`", *row] for name, *row in zip(names, *columns, strict=True)])
+
+
+def draw_pictures() -> None:
+    """Two sets of the page's bench with what the fit expects."""
+    known = replace(_THREAD, fibre=_PLAIN)
+    hidden = with_constants(known, {"shear": 0.3e9, "growth_100": 0.055})
+    found = identify(simulated_bench(hidden, ROWS, 1), known, compare=False)
+    for data in found.data:
+        if data.name in ("length.csv", "step.csv"):
+            path = DOCS / "pictures" / f"own_muscle_{data.name.removesuffix('.csv')}.png"
+            residuals_picture(found, data, path)
+
+
+def in_page(page: str, mark: str, lines: list[str]) -> None:
+    """Puts a table into a page, between its marks."""
+    path = DOCS / page
+    before, _, rest = path.read_text(encoding="utf-8").partition(mark)
+    _, _, after = rest.partition(END)
+    text = "\n".join([mark, "", *lines, "", END])
+    write_whole(path, f"{before}{text}{after}".encode())
+
+
 def main() -> None:
     """Goes on with the cases, and prints the table or writes it into the page."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--out", type=Path, default=Path("runs/identify"))
     parser.add_argument("--cases", type=int, default=CASES)
-    parser.add_argument("--page", action="store_true", help="write the table into the page")
+    parser.add_argument("--page", action="store_true", help="write the tables into the page")
+    parser.add_argument("--pictures", action="store_true", help="draw the page's pictures, too")
     asked = parser.parse_args()
     path = asked.out / "cases.jsonl"
     asked.out.mkdir(parents=True, exist_ok=True)
@@ -121,12 +170,13 @@ def main() -> None:
         if seed not in done:
             done[seed] = case(seed)
             append_whole(path, (json.dumps(done[seed]) + "\n").encode())
-    text = "\n".join(summary([done[seed] for seed in sorted(done)][: asked.cases]))
-    print(text)
-    if asked.page:
-        before, _, rest = PAGE.read_text(encoding="utf-8").partition(MARK)
-        _, _, after = rest.partition(END)
-        write_whole(PAGE, f"{before}{MARK}\n{text}\n{END}{after}".encode())
+    held = summary([done[seed] for seed in range(asked.cases)])
+    for page, mark, rows in (("identification.md", HELD, held), ("own-muscle.md", GAINS, gains())):
+        print("\n".join(rows), end="\n\n")
+        if asked.page:
+            in_page(page, mark, rows)
+    if asked.pictures:
+        draw_pictures()
 
 
 if __name__ == "__main__":

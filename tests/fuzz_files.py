@@ -21,6 +21,7 @@ from typing import Any
 import numpy as np
 from fuzz_samples import (
     TASK,
+    bench_file,
     good,
     model_zip,
     muscle,
@@ -42,6 +43,7 @@ from tca_mj.assets import mjcf
 from tca_mj.model.scene import scene
 from tca_mj.record import read
 from tca_mj.tca import read_tca
+from tca_mj.tca.identify import read_data
 
 WALK = "TCA/TetrapodWalk-v0"
 # What a number, a text or a list in a file may be instead.
@@ -245,6 +247,8 @@ READERS: dict[str, Reader] = {
     ),
     "network.onnx": Reader(_onnx, lambda path: _acts(path, task_env(TASK, action="power")),
                            ".onnx"),
+    "bench.csv": Reader(lambda: bench_file().read_bytes(),
+                        lambda path: read_data(path, good(tca_mj.TcaSpec)), ".csv"),
     "tca.json": Reader(lambda: muscle().read_bytes(), read_tca, ".json"),
     "statistics.npz": Reader(lambda: statistics().read_bytes(), Statistics.read, ".npz"),
     "recording.rrd": Reader(lambda: recorded().read_bytes(), read, ".rrd"),

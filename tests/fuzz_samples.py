@@ -116,6 +116,15 @@ def muscle() -> Path:
 
 
 @cache
+def bench_file() -> Path:
+    """A set of measurements."""
+    from tca_mj.tca.identify import simulated_bench, write_data
+
+    data = simulated_bench(good(tca_mj.TcaSpec), rows=5)[1]
+    return write_data(data, Path("bench.csv").absolute())
+
+
+@cache
 def statistics() -> Path:
     path = Path("statistics.npz").absolute()
     np.savez(path, mean=np.zeros(3), var=np.ones(3), clip=10.0, epsilon=1e-8)
@@ -210,6 +219,12 @@ BY_SURFACE: dict[str, dict[str, Any]] = {
     "tca.materials.Material.fibre": {
         "radius": 2e-4, "inserted_twist": 4000.0, "line_density": 1e-4,
     },
+    "tca.identify.bench.simulated_bench": {"rows": 5},
+    "tca.identify.constants.with_constants": {"values": lambda: {"shear": 0.2e9}},
+    "tca.identify.data.read_data": {"path": lambda: bench_file()},
+    "tca.identify.data.write_data": {"path": "made.csv"},
+    "tca.identify.identified.identify": {"free": ["shear"], "compare": False},
+    "tca.identify.reporting.write_identification": {"out": "identified", "held_out": []},
     "tca.files.read_tca": {"path": lambda: muscle()}, "tca.files.write_tca": {"path": "made.json"},
     "tca.files.measured_tca": {"errors": {"coils": 0.5}, "**": lambda: {
         "fibre": good(tca_mj.TcaSpec).fibre, "rest_length": 0.05, "resistance": 3.0,
@@ -419,6 +434,7 @@ def _samples() -> dict[Any, Callable[[], Any]]:
     from tca_mj.sim import Drive, Simulation
     from tca_mj.smp.lumped import LumpedModule
     from tca_mj.state import SimulationState, get_state
+    from tca_mj.tca.identify import Data, Identification, identify, read_data
 
     fibre = tca.CATALOGUE["free-stroke"]
     bank = cache(lambda: tca.TcaBank([fibre]))
@@ -448,8 +464,11 @@ def _samples() -> dict[Any, Callable[[], Any]]:
             pi=control.PiSpec(proportional=1.0, highest=2.0), angle_of=lambda ohms: 0.1
         )
 
+    measured = cache(lambda: read_data(bench_file(), fibre))
+    identified = cache(lambda: identify([measured()], fibre, free=["shear"], compare=False))
     muscles = [fibre]
     return {
+        Data: measured, Identification: identified,
         tca.TcaSpec: lambda: fibre, tca.FibreSpec: lambda: fibre.fibre,
         tca.FibreSpec | tca.FibreTable: lambda: fibre.fibre,
         tca.Material: lambda: tca.MATERIALS["nylon monofilament"],

@@ -35,6 +35,10 @@ INTERNAL = {
         "materials": "Named", "moduli": "softened", "spec": "heat_of",
         "thermal": "BareStep require_bare",
     },
+    "tca_mj.tca.identify": {
+        "bench": "measured", "constants": "decoded encoded known_of", "data": "SHOWN", "fit": "*",
+        "predict": "*", "reporting": "picture_name result",
+    },
     "tca_mj.rod": {
         "deadload": "*", "energy": "*", "lie": "*", "problem": "StaticProblem asked",
         "sections": "*", "shooting": "*", "solving": "*",

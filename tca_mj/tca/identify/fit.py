@@ -109,7 +109,8 @@ class Problem:
         for name in dict.fromkeys(names):
             width = CONSTANTS[name].width
             if name in errors:
-                width = errors[name] / (value[name] if CONSTANTS[name].log else 1.0)
+                error = errors[name] / (value[name] if CONSTANTS[name].log else 1.0)
+                width = min(width, error)
             known.append(Known(name, encoded(name, value[name]), width))
         if law == "linear":
             start = _linear_start(tca)

@@ -170,12 +170,17 @@ def assumed(data: Data, tca: TcaSpec) -> Data:
 
 def noise_of(data: Data, stated: Mapping[str, float]) -> dict[str, float]:
     """Standard deviation of what was measured, by quantity: as stated, or 0.5 K and 1 % of full
-    scale, the largest value; a load is exact."""
+    scale, the largest value; a load is exact.
+
+    Raises:
+        ValueError: If that of an outcome is 0, as of a column of zeros.
+    """
     found = {}
     for name in (*outcomes(data), *given_with_error(data)):
         usual = 0.01 * float(np.abs(data.columns[name]).max())
         usual = {"temperature": 0.5, "load": 0.0}.get(name, usual)
-        found[name] = float(stated.get(name, usual))
+        least = {"above": 0.0} if name in outcomes(data) else {"at_least": 0.0}
+        found[name] = number(f"noise of {name} in {data.name}", stated.get(name, usual), **least)
     return found
 
 

@@ -72,7 +72,7 @@ def sources(found: Identification) -> dict[str, Source]:
 
 @door
 def write_identification(
-    found: Identification, out: Path, held_out: Sequence[Data] = (), pictures: bool = False
+    found: Identification, out: str | Path, held_out: Sequence[Data] = (), pictures: bool = False
 ) -> None:
     """Writes the TCA as ``tca.json`` and the report as ``report.json`` and ``report.md``.
 
@@ -86,6 +86,7 @@ def write_identification(
         ValueError: As ``Identification.predict``.
         OSError: If they cannot be written.
     """
+    out = Path(out)
     write_tca(out / SPEC, found.tca, sources(found), "; ".join(found.words))
     write_result(out, REPORT, result(found, held_out), report(found, held_out, pictures=pictures))
 
