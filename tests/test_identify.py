@@ -15,6 +15,7 @@ from tca_mj.tca import (
     Heating,
     Load,
     LoadedTcas,
+    Source,
     hanging_length,
     read_tca,
     tension,
@@ -30,6 +31,7 @@ from tca_mj.tca.identify import (
     report,
     simulated_bench,
     sources,
+    stated_errors,
     with_constants,
     write_data,
     write_identification,
@@ -309,6 +311,14 @@ def test_an_error_of_the_ruler_is_one_of_the_modulus(bench):
         math.hypot(0.06, before.error / before.value), rel=0.2
     )
     assert next(f for f in blunt.found if f.name == "coil_radius").state == "stated"
+
+
+def test_errors_of_ruler_and_scale_are_those_of_the_file():
+    by_ruler = Source(kind="measured", error=5e-4)
+    assert stated_errors({
+        "fibre_length": by_ruler, "fibre.line_density": Source(kind="weighed", error=2e-6),
+        "coil_radius": Source(kind="measured"), "fibre.young": by_ruler,
+    }) == {"fibre_length": 5e-4, "line_density": 2e-6}  # fmt: skip
 
 
 def test_a_wrong_model_is_not_exact(bench):

@@ -18,8 +18,8 @@ def add_commands(commands: Commands) -> None:
     add(identify, "--free", "constants to be fitted; default: all but what a ruler or a balance"
         " says", nargs="+", metavar="NAME")  # fmt: skip
     add(identify, "--error", "standard error of a constant that was measured, in SI units; several"
-        " times for several", type=parse_option, action="append", default=[],
-        metavar="NAME=VALUE")  # fmt: skip
+        " times for several; default: those that the file of --tca states", type=parse_option,
+        action="append", default=[], metavar="NAME=VALUE")  # fmt: skip
     add(identify, "--noise", "standard deviation of a measured quantity, in SI units; default: 0.5"
         " K, and 1 %% of the largest value", type=parse_option, action="append", default=[],
         metavar="NAME=VALUE")  # fmt: skip
@@ -53,10 +53,18 @@ def _identify(arguments: argparse.Namespace) -> int:
       tca-mj identify length.csv force.csv --tca known.json --out runs/mine
       tca-mj identify *.csv --tca free-stroke --error coil_radius=1e-5 --out runs/mine
     """
-    from tca_mj.tca import find_tca
-    from tca_mj.tca.identify import identify, read_data, report, write_identification
+    from tca_mj.tca import find_tca, read_tca
+    from tca_mj.tca.identify import (
+        identify,
+        read_data,
+        report,
+        stated_errors,
+        write_identification,
+    )
 
-    tca, out = find_tca(arguments.tca), arguments.out
+    tca, out, errors = find_tca(arguments.tca), arguments.out, dict(arguments.error)
+    if arguments.tca.endswith(".json"):
+        errors = stated_errors(read_tca(arguments.tca).provenance) | errors
     if arguments.pictures:
         from tca_mj.validation.figures import need_matplotlib
 
@@ -64,8 +72,8 @@ def _identify(arguments: argparse.Namespace) -> int:
     data = [read_data(path, tca) for path in arguments.data]
     held = [read_data(path, tca) for path in arguments.held_out]
     found = identify(
-        data, tca, free=arguments.free, errors=dict(arguments.error), law=arguments.law,
-        ends=arguments.ends, noise=dict(arguments.noise), compare=arguments.compare,
+        data, tca, free=arguments.free, errors=errors, law=arguments.law, ends=arguments.ends,
+        noise=dict(arguments.noise), compare=arguments.compare,
     )  # fmt: skip
     write_identification(found, out, held, arguments.pictures)
     if arguments.pictures:

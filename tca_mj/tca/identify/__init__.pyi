@@ -9,10 +9,10 @@ from tca_mj.tca.identify.identified import (
     Prediction,
     identify,
 )
-from tca_mj.tca.identify.reporting import report, sources, write_identification
+from tca_mj.tca.identify.reporting import report, sources, stated_errors, write_identification
 
 __all__ = [
     "CONSTANTS", "Compared", "Constant", "Data", "Ends", "Found", "Identification", "Prediction",
     "constants_of", "identify", "read_data", "report", "simulated_bench", "sources",
-    "with_constants", "write_data", "write_identification",
+    "stated_errors", "with_constants", "write_data", "write_identification",
 ]  # fmt: skip

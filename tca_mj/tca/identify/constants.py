@@ -20,7 +20,8 @@ from types import MappingProxyType
 from typing import Any
 
 from tca_mj.checks import Finite, door, require_one_of
-from tca_mj.tca.spec import FibreSpec, TcaSpec
+from tca_mj.tca.spec import TcaSpec
+from tca_mj.tca.thread import FibreSpec
 
 _FORCE_COLD = "force against stretch to half as long again or more, cold, or loads hung on it"
 _STEP = "a step of power, or of voltage and current, with the temperature, until it is steady"

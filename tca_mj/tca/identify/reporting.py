@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from operator import attrgetter
 from pathlib import Path
 from typing import Any
@@ -68,6 +68,23 @@ def sources(found: Identification) -> dict[str, Source]:
             kept = tuple(error) if isinstance(error, list) else error
             result[value] = Source(kind="fitted", error=kept, data=data)
     return result
+
+
+@door
+def stated_errors(provenance: Mapping[str, Source]) -> dict[str, float]:
+    """The errors that the file of a TCA states of what ruler, caliper and scale have said: for
+    ``identify(..., errors=...)``.
+
+    Args:
+        provenance: Sources by the names of numbers, of ``TcaFile``.
+    """
+    found = {}
+    for name, constant in CONSTANTS.items():
+        own = provenance.get(name, provenance.get(f"fibre.{name}"))
+        error = None if own is None or constant.own else own.error
+        if isinstance(error, float) and error > 0.0:
+            found[name] = error
+    return found
 
 
 @door
