@@ -196,19 +196,20 @@ def test_two_outcomes_of_one_temperature_are_not_independent():
 
 
 def test_errors_in_what_is_given_do_not_flatten_a_slope():
-    """With weights that do not move, the modulus would come out 12 % too small: 13 errors."""
+    """With weights that do not move, a straight line's slope would be that of ordinary least
+    squares, too small by the variance of the errors over that of all: 12 %, some 20 errors."""
     random = np.random.default_rng(0)
     true = np.linspace(0.052, 0.09, 3000)
-    force = tension(TCA, true, 25.0)[0]
     data = Data(name="stretch.csv", fixed={}, ends="locked", columns={
         "length": true + 4e-3 * random.standard_normal(3000),
-        "force": force + 0.01 * random.standard_normal(3000),
+        "force": 25.0 * (true - 0.03) + 0.01 * random.standard_normal(3000),
     })  # fmt: skip
     noise = {"length": 4e-3, "force": 0.01}
-    start = with_constants(TCA, {"shear": 0.25e9})
-    found = identify([data], start, free=["shear"], noise=noise, compare=False).found[0]
-    assert abs(found.value - 0.3e9) < 3.0 * found.error
-    assert found.error < 0.02 * 0.3e9
+    result = identify([data], TCA, free=[], law="linear", noise=noise, compare=False)
+    found = {each.name: each for each in result.found}["linear_stiffness"]
+    assert abs(found.value - 25.0) < 3.0 * found.error and found.error < 0.01 * 25.0
+    flat = np.polyfit(*data.columns.values(), 1)[0]
+    assert flat == pytest.approx(25.0 / (1.0 + 16e-6 / np.var(true)), rel=0.02)
 
 
 @pytest.fixture(scope="module")

@@ -283,7 +283,7 @@ def fitted(problem: Problem, start: Array | None = None) -> Fit:
                  for each in (x, apart)]  # fmt: skip
         if costs[1] < costs[0] + quantile**2:
             x, slopes = apart, problem.slopes(apart, scales)
-    covariance: Array = np.linalg.inv(slopes.T @ slopes)
+    covariance = np.asarray(np.linalg.inv(slopes.T @ slopes), dtype=np.float64)
     return Fit(problem, x, covariance, pure, scales, slopes, quantile)
 
 

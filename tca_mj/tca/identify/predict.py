@@ -245,9 +245,10 @@ def weighed(
     for other in others:
         slope = other - model
         variance += slope[:, :, None] * slope[:, None, :]
-    factor: Array = np.linalg.cholesky(variance)
+    factor = np.linalg.cholesky(variance)
     measured = np.stack([data.columns[name] for name in found], axis=-1)
-    residual: Array = np.linalg.solve(factor, (measured - model)[..., None])[..., 0]
+    apart = (measured - model)[..., None]
+    residual = np.asarray(np.linalg.solve(factor, apart)[..., 0], dtype=np.float64)
     return model, residual, np.sqrt(np.diagonal(variance, axis1=1, axis2=2))
 
 
