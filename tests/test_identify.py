@@ -12,6 +12,7 @@ from tca_mj import BendingSpec
 from tca_mj.cli import main
 from tca_mj.tca import (
     CATALOGUE,
+    MATERIALS,
     Heating,
     Load,
     LoadedTcas,
@@ -312,6 +313,24 @@ def test_an_error_of_the_ruler_is_one_of_the_modulus(bench):
         math.hypot(0.06, before.error / before.value), rel=0.2
     )
     assert next(f for f in blunt.found if f.name == "coil_radius").state == "stated"
+
+
+def test_another_material_is_found_from_the_numbers_of_sewing_thread():
+    """A published coil of nylon monofilament, three times as stiff; it does not soften."""
+    fibre = MATERIALS["nylon monofilament"].measured
+    length = math.hypot(2.0 * math.pi * 18.3 * 0.816e-3, 25e-3)
+    coil = replace(
+        KNOWN, fibre=fibre, fibre_length=length, coil_radius=0.816e-3, breaking_force=None,
+        pitch_angle=math.asin(25e-3 / length), minimum_pitch_angle=0.14,
+    )  # fmt: skip
+    thread = MATERIALS["silver-coated nylon sewing thread"].fibre(
+        radius=fibre.radius, inserted_twist=fibre.inserted_twist, line_density=fibre.line_density
+    )
+    found = identify(simulated_bench(coil, rows=40, seed=1)[:3], replace(coil, fibre=thread),
+                     compare=False)  # fmt: skip
+    shear = next(each for each in found.found if each.name == "shear")
+    assert thread.shear < 0.4 * fibre.shear
+    assert abs(shear.value - fibre.shear) < 4.0 * shear.error < 0.2 * fibre.shear
 
 
 def test_errors_of_ruler_and_scale_are_those_of_the_file():

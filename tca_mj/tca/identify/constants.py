@@ -29,18 +29,18 @@ _STEP = "a step of power, or of voltage and current, with the temperature, until
 
 @dataclass(frozen=True, slots=True)
 class Constant:
-    """One constant.
+    """One constant that measurements may identify.
 
     Attributes:
         unit: Its unit.
         meaning: What it is, in words.
         measurement: What identifies it, in words.
         width: How well it is known before any data: standard deviation of its logarithm, or, of
-            a temperature, of itself [K]. Estimates.
+            a temperature, of itself; estimates [1 or K].
         own: Whether it is fitted without being asked for.
         log: Whether it is fitted as a logarithm.
         usual: Of one that may be 0, its size: where a fit starts if the TCA says 0, and what it is
-            measured against. Estimates.
+            measured against; estimates [``unit``].
     """
 
     unit: str
@@ -52,6 +52,7 @@ class Constant:
     usual: float = 0.0
 
 
+# The constants by name, in the order of reports.
 CONSTANTS: Mapping[str, Constant] = MappingProxyType({
     "rest_length": Constant(
         "m", "natural length", "its length without load at the reference temperature", 0.5),
@@ -114,7 +115,11 @@ _BODY = {"body_conductance": "conductance", "body_capacity": "capacity", "body_l
 
 @door
 def constants_of(tca: TcaSpec) -> dict[str, float]:
-    """The constants that a TCA has; those of a body only if it lies in one."""
+    """The constants that a TCA has, by name; those of a body only if it lies in one.
+
+    Args:
+        tca: The TCA.
+    """
     a2, a1 = tca.fibre.growth
     found = {name: getattr(tca.fibre, name) for name in (*_FIBRE, "softening_rate")}
     found |= {name: getattr(tca, name) for name in (*_OWN, "fibre_length", "coil_radius")}
@@ -130,6 +135,10 @@ def with_constants(tca: TcaSpec, values: Mapping[str, Finite]) -> TcaSpec:
     """The same TCA with some constants changed; what is not named stays, bit for bit.
 
     Another natural length keeps the turns, unless the coil's radius is changed, too.
+
+    Args:
+        tca: The TCA.
+        values: Values by the names in ``CONSTANTS``, in their units.
 
     Raises:
         ValueError: If there is no such constant or no such TCA.

@@ -154,6 +154,10 @@ def read_data(path: str | Path, tca: TcaSpec) -> Data:
 def write_data(data: Data, path: str | Path) -> Path:
     """Writes measurements as ``read_data`` reads them, every digit kept.
 
+    Args:
+        data: The measurements.
+        path: The file.
+
     Returns:
         The path.
 

@@ -50,12 +50,12 @@ class Found(NamedTuple):
 
     Attributes:
         name: Its name in ``CONSTANTS``.
-        value: Its value, in its unit.
+        value: Its value [``unit``].
         unit: That unit.
         state: "identified" by the data; "stated", with an error that the data do not improve; "not
             identified", where the value is no more than one that goes with the others.
-        error: Standard error; None if it is not identified.
-        interval: 95 %, a profile of the likelihood; None if it is not identified.
+        error: Standard error; None if it is not identified [``unit``].
+        interval: 95 %, a profile of the likelihood; None if it is not identified [``unit``].
     """
 
     name: str
@@ -72,8 +72,8 @@ class Compared(NamedTuple):
     Attributes:
         law: "rod", "love", "cst" or "linear".
         ends: Of the sets that do not say theirs, one of ``Ends``; None if all do.
-        criterion: Akaike's criterion above the best.
-        misfit: Largest ratio of residuals to stated errors in a set with lengths or forces.
+        criterion: Akaike's criterion above the best [1].
+        misfit: Largest ratio of residuals to stated errors in a set [1].
     """
 
     law: Law
@@ -87,10 +87,10 @@ class Prediction(NamedTuple):
 
     Attributes:
         outcome: The quantity.
-        measured: Measured values, shape (k,).
-        expected: Expected ones, shape (k,).
+        measured: Measured values, shape (k,) [SI, °C].
+        expected: Expected ones, shape (k,) [SI, °C].
         error: Standard error of what is measured about that, shape (k,): of the constants and of
-            the measurement.
+            the measurement [SI, K].
     """
 
     outcome: str

@@ -33,7 +33,11 @@ _BODY = ("body.conductance", "body.capacity", "body.loss")
 @door
 def sources(found: Identification) -> dict[str, Source]:
     """Where the fitted numbers of the TCA come from, for its file: errors follow from all
-    constants that a number depends on; one that depends on what is not identified has none."""
+    constants that a number depends on; one that depends on what is not identified has none.
+
+    Args:
+        found: The identification.
+    """
     fit, problem = found.fit, found.fit.problem
     names = [each.name for each in found.found if each.name in CONSTANTS]
     vague = {each.name for each in found.found if each.state == "not identified"}
@@ -141,7 +145,12 @@ def result(found: Identification, held_out: Sequence[Data] = ()) -> dict[str, An
 def report(
     found: Identification, held_out: Sequence[Data] = (), *, pictures: bool = False
 ) -> str:
-    """The page.
+    """The page of an identification, in Markdown.
+
+    Args:
+        found: The identification.
+        held_out: Measurements that were not fitted, to be judged.
+        pictures: Whether it shows a picture of each set, see ``picture_name``.
 
     Raises:
         ValueError: As ``Identification.predict``.
