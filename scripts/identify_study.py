@@ -145,9 +145,9 @@ def draw_pictures() -> None:
             residuals_picture(found, data, path)
 
 
-def in_page(page: str, mark: str, lines: list[str]) -> None:
-    """Puts a table into a page, between its marks."""
-    path = DOCS / page
+def in_page(mark: str, lines: list[str]) -> None:
+    """Puts a table into the page, between its marks."""
+    path = DOCS / "identification.md"
     before, _, rest = path.read_text(encoding="utf-8").partition(mark)
     _, _, after = rest.partition(END)
     text = "\n".join([mark, "", *lines, "", END])
@@ -171,10 +171,10 @@ def main() -> None:
             done[seed] = case(seed)
             append_whole(path, (json.dumps(done[seed]) + "\n").encode())
     held = summary([done[seed] for seed in range(asked.cases)])
-    for page, mark, rows in (("identification.md", HELD, held), ("own-muscle.md", GAINS, gains())):
+    for mark, rows in ((HELD, held), (GAINS, gains())):
         print("\n".join(rows), end="\n\n")
         if asked.page:
-            in_page(page, mark, rows)
+            in_page(mark, rows)
     if asked.pictures:
         draw_pictures()
 
