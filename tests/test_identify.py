@@ -198,7 +198,7 @@ def test_two_outcomes_of_one_temperature_are_not_independent():
 
 def test_errors_in_what_is_given_do_not_flatten_a_slope():
     """With weights that do not move, a straight line's slope would be that of ordinary least
-    squares, too small by the variance of the errors over that of all: 12 %, some 20 errors."""
+    squares, too small by the variance of the errors over that of all: 12 %, over 12 errors."""
     random = np.random.default_rng(0)
     true = np.linspace(0.052, 0.09, 3000)
     data = Data(name="stretch.csv", fixed={}, ends="locked", columns={
