@@ -204,6 +204,13 @@ BY_SURFACE: dict[str, dict[str, Any]] = {
     "tca.sensing.wire.fit_displacement": {
         "resistance": [3.0, 3.1, 3.2, 3.3, 3.4], "displacement": [0.0, 1e-3, 2e-3, 3e-3, 4e-3],
     },
+    "tca.sensing.observer.TcaObserver.begin": {"temperature": 25.0},
+    "tca.sensing.observer.TcaObserver.step": {"voltage": [1.0], "current": [0.3]},
+    "tca.sensing.observer.TcaObserver.bound": {
+        "truth": lambda: np.array([[60.0], [25.0], [0.05], [1.0]]) + np.zeros((2, 4, 1)),
+        "power": [[0.5]],
+    },
+    "tca.sensing.observer.TcaObserver.rank": {"powers": [0.5, 1.0], "load": 0.1},
     "tca.spec.TcaSpec": {
         "minimum_pitch_angle": 0.2, "fibre_length": 0.175, "coil_radius": 0.43e-3,
     },
@@ -439,6 +446,7 @@ def _samples() -> dict[Any, Callable[[], Any]]:
     fibre = tca.CATALOGUE["free-stroke"]
     bank = cache(lambda: tca.TcaBank([fibre]))
     creeping = cache(lambda: tca.CreepBank([fibre]))
+    watching = cache(lambda: tca.TcaObserver(bank()))
     lifting = cache(lambda: tca.LoadedTcas([fibre], tca.Load.weight(0.03)))
     heater = smp.HeaterSpec.fitted(smp.SpineSpec())
     spines = cache(lambda: smp.SpineBank([smp.SpineSpec()], [heater], [0]))
@@ -484,6 +492,7 @@ def _samples() -> dict[Any, Callable[[], Any]]:
         tca.Surface: lambda: tca.calibrate(fibre), tca.ConicalTca: lambda: tca.CONICAL,
         tca.HeatSpec: lambda: bank().heat, tca.HeatStep: lambda: tca.HeatStep.of(bank().heat, 0.02),
         tca.Centreline: lambda: tca.Centreline.of_tca(fibre),
+        tca.TcaObserver: watching, tca.Estimate: lambda: watching().begin([3.0]),
         tca.Thermostat: lambda: tca.Thermostat(heat=bank().heat, max_power=2.0),
         tca.Supply: tca.Supply,
         Polynomial: lambda: Polynomial([0.0, 1.0]),

@@ -24,6 +24,7 @@ from tca_mj.tca.laws.table import CalibrationError, Surface, SurfaceBound, calib
 from tca_mj.tca.mandrel import kept_share
 from tca_mj.tca.materials import MATERIALS, Material, Source
 from tca_mj.tca.moduli import FibreTable, radial_growth, softened_tension, softening, untwist
+from tca_mj.tca.sensing.observer import Estimate, ObserverSpec, Sensed, TcaObserver
 from tca_mj.tca.sensing.sensor import (
     CurrentSensor,
     measured,
@@ -55,16 +56,17 @@ from tca_mj.tca.thread import FibreSpec, still_air_loss
 __all__ = [
     "BodyHeat", "CATALOGUE", "CONICAL", "CalibrationError", "Centreline", "CoilRods", "CoilShape",
     "CoilSolveError", "CoilSurfaces", "ConicalTca", "Course", "CreepBank", "CreepSpec",
-    "CreepState", "CurrentSensor", "DisplacementFit", "FREE_STROKE_CREPT", "FibreShape",
+    "CreepState", "CurrentSensor", "DisplacementFit", "Estimate", "FREE_STROKE_CREPT", "FibreShape",
     "FibreSpec", "FibreTable", "HeatSpec", "HeatStep", "Heating", "LawChoice", "Load", "LoadState",
-    "LoadedTcas", "MATERIALS", "MODULE_TCAS", "Material", "MotionSolveError", "Plies", "Pull",
-    "SensingSpec", "Signal", "Source", "Stiffness", "Supply", "Surface", "SurfaceBound", "TcaBank",
-    "TcaFile", "TcaMelted", "TcaSpec", "TcaState", "TensionLaw", "Thermostat", "WireTable", "aged",
-    "calibrate", "coil_tension", "fibre_stiffness", "find_tca", "fit_displacement",
-    "hanging_length", "heat_lost", "hysteresis_damping", "in_silicone", "kept_share", "law_at",
-    "measured", "measured_tca", "moving_average", "power_from_voltage", "pulling_temperature",
-    "pulse_mean", "pulse_power", "radial_growth", "read_tca", "relaxation_time", "resistance",
-    "resistance_displacement", "ring_conductance", "sensed_length", "silicone_body",
-    "softened_tension", "softening", "solve_course", "solve_fibre", "step_temperature",
-    "still_air_loss", "tension", "untwist", "with_tca", "write_tca",
+    "LoadedTcas", "MATERIALS", "MODULE_TCAS", "Material", "MotionSolveError", "ObserverSpec",
+    "Plies", "Pull", "Sensed", "SensingSpec", "Signal", "Source", "Stiffness", "Supply", "Surface",
+    "SurfaceBound", "TcaBank", "TcaFile", "TcaMelted", "TcaObserver", "TcaSpec", "TcaState",
+    "TensionLaw", "Thermostat", "WireTable", "aged", "calibrate", "coil_tension", "fibre_stiffness",
+    "find_tca", "fit_displacement", "hanging_length", "heat_lost", "hysteresis_damping",
+    "in_silicone", "kept_share", "law_at", "measured", "measured_tca", "moving_average",
+    "power_from_voltage", "pulling_temperature", "pulse_mean", "pulse_power", "radial_growth",
+    "read_tca", "relaxation_time", "resistance", "resistance_displacement", "ring_conductance",
+    "sensed_length", "silicone_body", "softened_tension", "softening", "solve_course",
+    "solve_fibre", "step_temperature", "still_air_loss", "tension", "untwist", "with_tca",
+    "write_tca",
 ]  # fmt: skip
