@@ -6,7 +6,7 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from copy import deepcopy
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any, ClassVar, TypedDict, Unpack
 
@@ -37,7 +37,17 @@ from tca_mj.record.render import Offscreen, Pixels, colour_tendons
 from tca_mj.registry import ControlPeriod
 from tca_mj.sim import Drive, Simulation, SimulationDiverged, Timestep
 from tca_mj.state import get_state, set_state
-from tca_mj.tca import HeatSpec, Supply, TcaSpec, Thermostat, with_tca
+from tca_mj.tca import (
+    Estimate,
+    HeatSpec,
+    ObserverSpec,
+    Supply,
+    TcaBank,
+    TcaObserver,
+    TcaSpec,
+    Thermostat,
+    with_tca,
+)
 from tca_mj.variation import AMBIENT, Nominal, Variation
 
 # What of a task may change in an episode has one of these types; and what never does, by name.
@@ -47,6 +57,7 @@ _BUILT = (
     "heating", "control_period", "interval", "repeats", "share", "_off", "_half_range", "_own_tca",
 )  # fmt: skip
 _DAMAGE = frozenset(("TCA temperature", "TCA tension"))  # rows that are out of bounds by damage
+_ESTIMATED = {"TCA temperature", "TCA length", "TCA tension"}  # rows that an observer can fill
 HEATINGS = ("temperature", "power")  # what a number of an action means to a TCA
 
 
@@ -63,6 +74,8 @@ class TaskArguments(TypedDict, total=False):
         tca: The muscle of the robot in place of its own: a TCA, its name in ``CATALOGUE`` or its
             file, see ``tca_mj.tca.with_tca``. It is cut to its routes and laid into silicone as
             the robot's own; the robot has to get through its first step with it.
+        estimated: Whether temperature, length and tension of the TCAs are seen as a
+            ``TcaObserver`` tells them from voltage and current; by default they are the true ones.
     """
 
     action: str
@@ -71,6 +84,7 @@ class TaskArguments(TypedDict, total=False):
     camera: str
     size: tuple[int, int]
     tca: TcaSpec | str | Path | None
+    estimated: bool
 
 
 class SimulatedTask(gym.Env[Observation, Action], ABC):
@@ -137,6 +151,10 @@ class SimulatedTask(gym.Env[Observation, Action], ABC):
         published_speed: Speeds of the real robot by the stage that shows them [m/s].
         recipes: How it is learned, by algorithm; the first is what was best. ``recipes_for`` says
             it of a class that is several tasks.
+        observer: What estimates the TCAs, or None: with ``estimated``. It believes the nominal heat
+            loss, knows the temperatures at the reset and that of the surroundings, and reads
+            power and resistance once in ``interval``.
+        observer_spec: How far it trusts its model and its readings, whose noise is drawn so.
         finer: Finer models of the robot by name: each turns the specification into arguments of
             ``__init__``, the finer specification among them.
         scene: What builds the robot in its scene from its specification.
@@ -163,6 +181,8 @@ class SimulatedTask(gym.Env[Observation, Action], ABC):
     robot_argument: ClassVar[tuple[str, Callable[[], Any]] | None] = None
     finer: ClassVar[Mapping[str, Callable[[Any], dict[str, Any]]]] = {}
 
+    observer_spec: ClassVar[ObserverSpec] = ObserverSpec()
+
     scene: ClassVar[Callable[[Any], Part] | None] = None
     rows: ClassVar[Sequence[Entry]] = ()
     option_rows: ClassVar[Sequence[Option]] = ()
@@ -183,6 +203,8 @@ class SimulatedTask(gym.Env[Observation, Action], ABC):
     _size: tuple[int, int]
     _screen: Offscreen | None = None
     _own_tca: bool = False
+    observer: TcaObserver | None = None
+    _believed: tuple[NDArray[np.float64], ...] = ()  # mean, covariance, and the energy so far
     _off: NDArray[np.float64]
     _half_range: float | NDArray[np.float64]
 
@@ -227,12 +249,14 @@ class SimulatedTask(gym.Env[Observation, Action], ABC):
         camera: str | None = None,
         size: tuple[Pixels, Pixels] = (960, 720),
         tca: TcaSpec | str | Path | None = None,
+        estimated: bool = False,
     ) -> None:
         """Takes what the task is made of, and ``TaskArguments``; to be called once by ``__init__``.
 
         Raises:
-            ValueError: If an argument is unknown or out of range, or the control period no multiple
-                of the time between two updates of the TCAs.
+            ValueError: If an argument is unknown or out of range, the control period no multiple
+                of the time between two updates of the TCAs, or muscles that are no TCAs are to be
+                estimated.
         """
         if tca is not None:  # ``_robot`` would have taken it
             raise ValueError(f"tca must be None for {type(self).__name__}, got {shown(tca)}")
@@ -257,6 +281,14 @@ class SimulatedTask(gym.Env[Observation, Action], ABC):
                 f" updates of the TCAs, got {asked}"
             )
         self.share = self.interval / own  # of a price per step that each judgement takes
+        if estimated:
+            if not isinstance(sim.bank, TcaBank) or not _ESTIMATED & observation.slices.keys():
+                raise ValueError(
+                    f"estimated must be False unless all muscles are TCAs and one of"
+                    f" {sorted(_ESTIMATED)} is seen, got True"
+                )
+            nominal = TcaBank(sim.bank.specs, sim.bank.law)
+            self.observer = TcaObserver(nominal, self.observer_spec)
         self.metadata = {**self.metadata, "render_fps": max(1, round(1.0 / self.control_period))}
         self._off, self._half_range = np.zeros(sim.n), self.max_power / 2.0  # what TCAs are told
         if heating == "temperature":
@@ -326,7 +358,39 @@ class SimulatedTask(gym.Env[Observation, Action], ABC):
 
     def seen(self) -> Observation:
         """The observation."""
-        return self.observation.pack(self.observe())
+        values = self.observe()
+        if self._believed:
+            values |= self._estimated({e.name: e for e in self.observation.entries})
+        return self.observation.pack(values)
+
+    def _estimated(self, rows: Mapping[str, Entry]) -> dict[str, ArrayLike]:
+        """The rows of the TCAs by the observer, within their bounds."""
+        assert self.observer is not None
+        now = Estimate(*self._believed[:2])
+        tension = self.observer.tension(now).tension
+        values = {"temperature": now.temperature, "length": now.length, "tension": tension}
+        found = {f"TCA {name}": value for name, value in values.items()}
+        return {
+            name: np.clip(value[: rows[name].size], rows[name].low, rows[name].high)
+            for name, value in found.items() if name in rows
+        }  # fmt: skip
+
+    def _sense(self) -> None:
+        """The observer reads power and resistance of the TCAs."""
+        if self.observer is None or not np.isfinite(self.sim.resistance).all():
+            return
+        sim, noise = self.sim, self.observer_spec.resistance_noise
+        ohms = np.maximum(sim.resistance + noise * self.np_random.standard_normal(sim.n), noise)
+        if not self._believed:
+            bank = self.observer.bank
+            bank.heat = replace(bank.heat, ambient=sim.bank.heat.ambient)
+            now = self.observer.begin(ohms, sim.temperature)
+        else:
+            mean, covariance, before = self._believed
+            power = np.maximum(sim.energy - before, 0.0) / self.interval
+            now = self.observer.predicted(Estimate(mean, covariance), power, self.interval)
+            now = self.observer.corrected(now, ohms)
+        self._believed = now.mean, now.covariance, sim.energy.copy()
 
     def details(self) -> dict[str, Any]:
         """What ``info`` says besides."""
@@ -380,7 +444,8 @@ class SimulatedTask(gym.Env[Observation, Action], ABC):
             raise ValueError(
                 f"options must leave a robot that comes to rest, got {self._varied}: {error}"
             ) from error
-        self._used = self.energy
+        self._used, self._believed = self.energy, ()
+        self._sense()
         return self.seen(), self._info(success=False)
 
     def _robot(self, given: Any, common: TaskArguments) -> Any:
@@ -429,6 +494,7 @@ class SimulatedTask(gym.Env[Observation, Action], ABC):
         table, sim = self.observation, self.sim
         reason = broken_off(error)
         harmed = None if error else self.harm()
+        self._sense()
         observation = self.seen()
         outside = table.outside(observation)
         if outside:

@@ -26,6 +26,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -161,10 +162,7 @@ class TcaObserver:
                 is that of the bank, over the length alone.
         """
         self.bank, self.spec = bank, spec or ObserverSpec()
-        table = wire.WireTable.of(bank.specs)
-        self._resistance = resistance or (
-            lambda length, temperature: wire.resistance(table, length, temperature)
-        )
+        self._resistance = resistance or partial(wire.resistance, wire.WireTable.of(bank.specs))
         self._adapts = self.spec.loss_error > 0.0 or self.spec.loss_rate > 0.0
 
     @door
