@@ -511,6 +511,7 @@ def _samples() -> dict[Any, Callable[[], Any]]:
         smp.SpinesState: lambda: spines().rest([0.1]),
         smp.HeaterState: lambda: smp.HeaterState.rest(heater, (1,)),
         smp.SpineState: lambda: smp.SpineState.rest(smp.SmpSpec(), np.array([0.1])),
+        control.TcaServo: lambda: control.TcaServo(watching(), good(tca.Thermostat)),
         LumpedModule: lumped, control.PiState: control.pi_rest,
         control.Gait: lambda: WALK, control.ClosedLoop: loop,
         control.MorphSequence: lambda: control.MorphSequence(drive=loop()),

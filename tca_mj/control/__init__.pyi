@@ -9,9 +9,10 @@ from tca_mj.control.morph import (
     Phase,
 )
 from tca_mj.control.pi import PiSpec, PiState, pi_rest, pi_step
+from tca_mj.control.servo import TcaServo, goal_temperature
 from tca_mj.tca.supply import Thermostat as Thermostat
 
 __all__ = [
     "ClosedLoop", "Command", "Gait", "Measurement", "MorphSequence", "MorphState", "OpenLoop",
-    "Phase", "PiSpec", "PiState", "pi_rest", "pi_step",
+    "Phase", "PiSpec", "PiState", "TcaServo", "goal_temperature", "pi_rest", "pi_step",
 ]  # fmt: skip
