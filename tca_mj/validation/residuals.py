@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from tca_mj.tca.identify import Data, Identification
-from tca_mj.tca.identify.data import SHOWN
+from tca_mj.tca.identify import Data, Followed, Identification
+from tca_mj.tca.identify.data import DRIVES, SHOWN
 from tca_mj.tca.identify.predict import given_with_error, length_name
 from tca_mj.validation.figures import draw
 
@@ -29,6 +29,38 @@ def residuals_picture(found: Identification, data: Data, path: Path) -> None:
     """
     known = found.predict(data)
     draw(path, 4.2 * len(known), 4.6, partial(_fill, data=data, known=known))
+
+
+def log_picture(found: Followed, path: Path) -> None:
+    """Draws a log over time: what drove the TCA, and what was measured, modelled and observed.
+
+    Args:
+        found: The log and what was made of it.
+        path: Picture to write; its folder exists.
+
+    Raises:
+        ImportError: If Matplotlib is not installed.
+    """
+    drives = [name for name in (*DRIVES, "duty") if name in found.data.columns]
+    draw(path, 7.5, 1.8 * (1 + len(found.model)), partial(_follow, found=found, drives=drives))
+
+
+def _follow(figure: Any, found: Followed, drives: list[str]) -> None:
+    columns, (top, *panels) = found.data.columns, figure.subplots(1 + len(found.model), sharex=True)
+    time = columns["time"]
+    for name in drives:
+        top.plot(time, columns[name], lw=1, drawstyle="steps-post", label=f"{name} [{SHOWN[name]}]")
+    top.set(title=found.data.name)
+    for panel, (name, model) in zip(panels, found.model.items(), strict=True):
+        if name in columns:
+            panel.plot(time, columns[name], ".", color="#999999", ms=2, label="measured")
+        panel.plot(time, model, color=_LINE, label="model")
+        if name in found.observed:
+            panel.plot(time, found.observed[name], color=_DOT, lw=1, label="observer")
+        panel.set_ylabel(f"{name} [{SHOWN[name]}]")
+    panels[-1].set_xlabel("time [s]")
+    for panel in (top, *panels):
+        panel.legend(loc="upper right")
 
 
 def _fill(figure: Any, data: Data, known: Any) -> None:

@@ -12,7 +12,8 @@ from tca_mj.tca.identify.identified import (
 from tca_mj.tca.identify.reporting import report, sources, stated_errors, write_identification
 
 __all__ = [
-    "CONSTANTS", "Compared", "Constant", "Data", "Ends", "Found", "Identification", "Prediction",
-    "constants_of", "identify", "read_data", "report", "simulated_bench", "sources",
-    "stated_errors", "with_constants", "write_data", "write_identification",
+    "CONSTANTS", "Compared", "Constant", "Data", "Ends", "Followed", "Found", "Identification",
+    "Prediction", "constants_of", "follow_log", "identify", "read_data", "report",
+    "simulated_bench", "sources", "stated_errors", "with_constants", "write_data",
+    "write_identification",
 ]  # fmt: skip

@@ -37,6 +37,7 @@ UNITS: Mapping[str, Mapping[str, float]] = MappingProxyType({
     "voltage": {"V": 1.0, "mV": 1e-3},
     "current": {"A": 1.0, "mA": 1e-3},
     "power": {"W": 1.0, "mW": 1e-3},
+    "duty": {"1": 1.0, "%": 0.01},
     "temperature": _CELSIUS | {"K": 1.0},
     "ambient": _CELSIUS | {"K": 1.0},
     "length": _LENGTHS,
@@ -47,7 +48,8 @@ UNITS: Mapping[str, Mapping[str, float]] = MappingProxyType({
     "resistance": {"ohm": 1.0, "Ohm": 1.0, "Ω": 1.0, "mohm": 1e-3, "kohm": 1e3},
 })  # fmt: skip
 DRIVES = ("power", "voltage", "current")
-SHOWN = {"time": "s", "voltage": "V", "current": "A", "power": "W", "temperature": "degC",
+SHOWN = {"time": "s", "voltage": "V", "current": "A", "power": "W", "duty": "1",
+         "temperature": "degC",
          "ambient": "degC", "length": "m", "displacement": "m", "stretch": "m", "force": "N",
          "load": "N", "resistance": "ohm"}  # fmt: skip
 """Unit in which each quantity is kept."""
@@ -264,7 +266,8 @@ def _bounds(tca: TcaSpec) -> dict[str, tuple[float, float]]:
     ohms = tca.resistance_per_length * tca.rest_length
     return {
         "time": (-1e7, 1e7), "voltage": (-200.0, 200.0), "current": (-20.0, 20.0),
-        "power": (0.0, 1e3), "temperature": (-60.0, hottest), "ambient": (-60.0, 100.0),
+        "power": (0.0, 1e3), "duty": (0.0, 1.0), "temperature": (-60.0, hottest),
+        "ambient": (-60.0, 100.0),
         "length": (shortest, longest), "displacement": (-longest, longest),
         "stretch": (-longest, longest), "force": (-0.1 * strongest, strongest),
         "load": (0.0, strongest), "resistance": (1e-3 * ohms, 1e3 * ohms),

@@ -13,7 +13,8 @@ Which quantity of a file is an outcome and which is given:
 ``displacement`` is contraction and ``stretch`` extension, from the length that a line ``# length
 [mm]: 45`` says; without it an outcome's start is one more unknown, and a given one's is the natural
 length. Rows at rest are in equilibrium. A course starts at the temperature of the surroundings,
-what drives is held from each row to the next, the heat is exact and the length in equilibrium with
+what drives is held from each row to the next (a voltage or current of pulses, for the share of the
+time that ``duty`` says), the heat is exact and the length in equilibrium with
 it, as in the quasi-static motion of ``LoadedTcas``.
 
 What is given has errors, too. Each row's residuals r = outcome - model(given) are weighed with
@@ -266,8 +267,13 @@ def _power(data: Data) -> Array | None:
     if "power" in data.columns:
         return data.columns["power"]
     if "voltage" in data.columns and "current" in data.columns:
-        return np.abs(data.columns["voltage"] * data.columns["current"])
+        return duty(data) * np.abs(data.columns["voltage"] * data.columns["current"])
     return None
+
+
+def duty(data: Data) -> Array:
+    """Share of the time that voltage and current, which are those of pulses, are on, (k,) [1]."""
+    return data.columns.get("duty", np.ones(data.rows))
 
 
 def _load(data: Data) -> Array:
@@ -286,8 +292,9 @@ def _course(data: Data, muscle: Muscle, ends: Spin) -> Array:
         tuple(map(float, (s.own, s.taken, s.warmed, s.body_own, s.given, s.body_warmed)))
         for s in heat
     ]
-    drive = "power" if power is not None else next(n for n in DRIVES if n in data.columns)
-    driven = (np.square(data.columns[drive]) if power is None else power).tolist()
+    drive = next(n for n in DRIVES if n in data.columns)
+    on = duty(data) * np.square(data.columns[drive])
+    driven = (on if power is None else power).tolist()
     ohms = _ohms(data, muscle, ends) if power is None else None
 
     x, y, found = 0.0, 0.0, [0.0]  # excess of the TCA and of its body over the surroundings

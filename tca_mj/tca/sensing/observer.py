@@ -273,6 +273,11 @@ class TcaObserver:
         return Estimate(mean, estimate.covariance - gain[:, None] * gain * spread)
 
     @door
+    def expected(self, estimate: Estimate) -> Array:
+        """Resistance at an estimate, shape (..., n) [ohm]."""
+        return self._read(estimate.length, estimate.temperature)[0]
+
+    @door
     def tension(self, estimate: Estimate) -> Sensed:
         """Tension at the believed length and temperature, and how sure it is, shape (..., n)."""
         force, slope, by_heat = self._law(estimate.length, estimate.temperature)
