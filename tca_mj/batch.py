@@ -192,8 +192,15 @@ def _alike(first: Simulation, other: Simulation) -> bool:
         and (first.bank.law, first.bank.specs) == (other.bank.law, other.bank.specs)
         and np.array_equal(first.length_offset, other.length_offset)
         and first.bank.supply.like(other.bank.supply)
+        and _creep(first) == _creep(other)
         and first.haste == other.haste
     )
+
+
+def _creep(sim: Simulation) -> Any:
+    """Constants by which its TCAs creep; None if they do not."""
+    creeping = getattr(sim.bank, "creep", None)
+    return creeping and creeping.creep
 
 
 class _Every:

@@ -43,6 +43,8 @@ from tca_mj.rod.shape import bend
 from tca_mj.tca import (
     CalibrationError,
     CoilSolveError,
+    CreepingState,
+    CreepSpec,
     LawChoice,
     Pull,
     Supply,
@@ -50,6 +52,7 @@ from tca_mj.tca import (
     TcaMelted,
     TcaSpec,
     TcaState,
+    aged,
 )
 
 # Physics steps between two updates of the TCAs, and in one call: MuJoCo cannot be interrupted in
@@ -188,6 +191,8 @@ class Simulation:
         law: LawChoice = "surface",
         supply: Supply | None = None,
         haste: Haste | None = None,
+        creep: CreepSpec | None = None,
+        cycles: NotNegative = 0.0,
     ) -> None:
         """Compiles ``part``; its specification can still be changed and compiled again.
 
@@ -203,6 +208,10 @@ class Simulation:
                 which no published one lacks, the exact "rod" takes its place; ``bank.law`` tells.
             supply: What the commands of ``step`` mean; by default they are powers.
             haste: Smaller steps while something snaps; None for none.
+            creep: Constants by which the TCAs creep and relax, see ``tca.laws.creep``; None for
+                none. They begin as trained ones do, at their natural lengths.
+            cycles: Heating cycles that they have behind them, by which they have ``aged``, with
+                these constants or, without them, the default ones [1].
 
         Raises:
             ValueError: If a number is out of range, a period is no multiple of the time step,
@@ -226,7 +235,9 @@ class Simulation:
         self.tca_period = tca_period
         self.chains = part.members
         self.tca_names = tuple(tca.name for tca in part.tcas)
-        self.bank = _bank([tca.spec for tca in part.tcas], law, ambient)
+        self.bank = _bank(
+            [tca.spec for tca in part.tcas], law, ambient, creep, cycles
+        )
         self.bank.supply = supply or Supply()
         self.substeps = substeps
         self._lasting = math.nan, 0  # a duration, and how many updates it takes
@@ -299,7 +310,10 @@ class Simulation:
         Raises:
             ValueError: As ``TcaBank.steady``.
         """
-        self.tca, power = self.bank.steady(temperature)
+        steady, power = self.bank.steady(temperature)
+        if isinstance(self.tca, CreepingState):
+            steady = replace(steady, shift=self.tca.shift)
+        self.tca = steady
         return power
 
     @door
@@ -655,7 +669,9 @@ def _steadiness(timestep: float, tca_period: float) -> float:
     return max(timestep, 0.4 * tca_period)
 
 
-def _bank(specs: Sequence[Any], law: LawChoice, ambient: float) -> Any:
+def _bank(
+    specs: Sequence[Any], law: LawChoice, ambient: float, creep: CreepSpec | None, cycles: float
+) -> Any:
     """The bank of all muscles."""
     kinds: dict[type, list[int]] = {}
     for place, spec in enumerate(specs):
@@ -664,7 +680,7 @@ def _bank(specs: Sequence[Any], law: LawChoice, ambient: float) -> Any:
     for kind, places in kinds.items():
         own = [specs[i] for i in places]
         if kind is TcaSpec:
-            banks.append((np.array(places), _tca_bank(own, law, ambient)))
+            banks.append((np.array(places), _tca_bank(own, law, ambient, creep, cycles)))
         else:
             banks.append((np.array(places), kind.bank(own)))  # type: ignore[attr-defined]
     if len(banks) == 1 and isinstance(banks[0][1], TcaBank):
@@ -672,9 +688,13 @@ def _bank(specs: Sequence[Any], law: LawChoice, ambient: float) -> Any:
     return MixedBank(specs, banks)
 
 
-def _tca_bank(specs: Sequence[TcaSpec], law: LawChoice, ambient: float) -> TcaBank:
+def _tca_bank(
+    specs: Sequence[TcaSpec], law: LawChoice, ambient: float, creep: CreepSpec | None, cycles: float
+) -> TcaBank:
     surrounded = tuple(replace(spec, ambient=ambient) for spec in specs)
+    if cycles > 0.0:
+        surrounded = tuple(aged(spec, cycles, creep or CreepSpec()) for spec in surrounded)
     try:
-        return TcaBank(surrounded, law)
+        return TcaBank(surrounded, law, creep)
     except CalibrationError:
-        return TcaBank(surrounded, "rod")
+        return TcaBank(surrounded, "rod", creep)

@@ -9,7 +9,7 @@ import pytest
 from tca_mj.batch import SimulationBatch
 from tca_mj.modules.bending import bending_module
 from tca_mj.sim import Drive, Simulation
-from tca_mj.tca import CATALOGUE, HeatSpec, Supply, TcaBank, Thermostat
+from tca_mj.tca import CATALOGUE, HeatSpec, Supply, TcaBank, Thermostat, pulse_power
 from tca_mj.tca.spec import heat_of
 
 SPECS = [CATALOGUE["free-stroke"], CATALOGUE["type-2-180"], CATALOGUE["self-coiled"]]
@@ -47,6 +47,22 @@ def test_the_resistance_is_that_of_the_stretched_wire():
     more, other = driven(Supply(quantity="voltage"), volts, stretch=1.0)
     assert (np.abs(more / ohms - 1.0) > 1e-3).all()
     assert other * more == pytest.approx(power * ohms, rel=1e-12)
+
+
+def test_pulses_heat_for_the_share_that_they_are_on():
+    """The mean of U²/R over on and off, not (duty U)²/R; a limit of current is one of the pulse."""
+    duty = np.array([0.0, 0.3, 1.0])
+    ohms, power = driven(Supply(quantity="duty", max_voltage=3.0), duty)
+    on = np.arange(1000) < np.array([[0.0], [300.0], [1000.0]])
+    assert power == pytest.approx(np.mean(on * 9.0, axis=1) / ohms, rel=1e-12)
+    assert power == pytest.approx(pulse_power(3.0, duty, ohms), rel=1e-12)
+    weak = Supply(quantity="duty", max_voltage=3.0, max_current=0.2, max_power=0.05)
+    ohms, power = driven(weak, duty)
+    assert power == pytest.approx(np.minimum(duty * 0.04 * ohms, 0.05), rel=1e-12)
+    with pytest.raises(ValueError, match="duty must be finite and at least 0 and at most 1, got"):
+        weak.checked([0.0, 1.2, 0.0], 3)
+    with pytest.raises(ValueError, match="max_voltage, of the pulses, must be finite, got inf"):
+        Supply(quantity="duty")
 
 
 @pytest.mark.parametrize("quantity", ["power", "voltage", "current"])

@@ -21,6 +21,7 @@ QUANTITIES = {
     "resistance": "Resistance [Ω]",
 }
 BODY_QUANTITY, BODY_TITLE = "body_temperature", "Soft bodies [°C]"
+_SHOWN = "body temperature"  # a signal of TCAs, which is shown as ``BODY_QUANTITY``
 HEATER_QUANTITIES = {"voltage": "Spine heaters [V]", "temperature": "Spines [°C]"}
 
 _LIGHTNESS = 0.75  # of the curves, on Rerun's dark ground
@@ -75,7 +76,7 @@ def groups(simulation: Any) -> list[Group]:
     for group in getattr(simulation, "groups", ()):
         root, titles = group.kind.replace(" ", "_"), {
             name: f"{group.kind}: {name} [{signal.unit}]" for name, signal in group.signals.items()
-            if group.kind != "TCA" and name not in (*QUANTITIES, "energy")
+            if name not in (*QUANTITIES, "energy") and (group.kind, name) != ("TCA", _SHOWN)
         }  # fmt: skip
         if group.kind == "spine":
             root, titles = "heaters", HEATER_QUANTITIES

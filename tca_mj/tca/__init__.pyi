@@ -1,4 +1,4 @@
-from tca_mj.tca.bank import Pull, Signal, TcaBank, TcaMelted, TcaState
+from tca_mj.tca.bank import CreepingState, Pull, Signal, TcaBank, TcaMelted, TcaState
 from tca_mj.tca.catalogue import CATALOGUE, FREE_STROKE_CREPT, MODULE_TCAS
 from tca_mj.tca.dynamics.banded import solve_course
 from tca_mj.tca.dynamics.loads import Course, Heating, Load, LoadState
@@ -56,17 +56,17 @@ from tca_mj.tca.thread import FibreSpec, still_air_loss
 __all__ = [
     "BodyHeat", "CATALOGUE", "CONICAL", "CalibrationError", "Centreline", "CoilRods", "CoilShape",
     "CoilSolveError", "CoilSurfaces", "ConicalTca", "Course", "CreepBank", "CreepSpec",
-    "CreepState", "CurrentSensor", "DisplacementFit", "Estimate", "FREE_STROKE_CREPT", "FibreShape",
-    "FibreSpec", "FibreTable", "HeatSpec", "HeatStep", "Heating", "LawChoice", "Load", "LoadState",
-    "LoadedTcas", "MATERIALS", "MODULE_TCAS", "Material", "MotionSolveError", "ObserverSpec",
-    "Plies", "Pull", "Sensed", "SensingSpec", "Signal", "Source", "Stiffness", "Supply", "Surface",
-    "SurfaceBound", "TcaBank", "TcaFile", "TcaMelted", "TcaObserver", "TcaSpec", "TcaState",
-    "TensionLaw", "Thermostat", "WireTable", "aged", "calibrate", "coil_tension", "fibre_stiffness",
-    "find_tca", "fit_displacement", "hanging_length", "heat_lost", "hysteresis_damping",
-    "in_silicone", "kept_share", "law_at", "measured", "measured_tca", "moving_average",
-    "power_from_voltage", "pulling_temperature", "pulse_mean", "pulse_power", "radial_growth",
-    "read_tca", "relaxation_time", "resistance", "resistance_displacement", "ring_conductance",
-    "sensed_length", "silicone_body", "softened_tension", "softening", "solve_course",
-    "solve_fibre", "step_temperature", "still_air_loss", "tension", "untwist", "with_tca",
-    "write_tca",
+    "CreepState", "CreepingState", "CurrentSensor", "DisplacementFit", "Estimate",
+    "FREE_STROKE_CREPT", "FibreShape", "FibreSpec", "FibreTable", "HeatSpec", "HeatStep", "Heating",
+    "LawChoice", "Load", "LoadState", "LoadedTcas", "MATERIALS", "MODULE_TCAS", "Material",
+    "MotionSolveError", "ObserverSpec", "Plies", "Pull", "Sensed", "SensingSpec", "Signal",
+    "Source", "Stiffness", "Supply", "Surface", "SurfaceBound", "TcaBank", "TcaFile", "TcaMelted",
+    "TcaObserver", "TcaSpec", "TcaState", "TensionLaw", "Thermostat", "WireTable", "aged",
+    "calibrate", "coil_tension", "fibre_stiffness", "find_tca", "fit_displacement",
+    "hanging_length", "heat_lost", "hysteresis_damping", "in_silicone", "kept_share", "law_at",
+    "measured", "measured_tca", "moving_average", "power_from_voltage", "pulling_temperature",
+    "pulse_mean", "pulse_power", "radial_growth", "read_tca", "relaxation_time", "resistance",
+    "resistance_displacement", "ring_conductance", "sensed_length", "silicone_body",
+    "softened_tension", "softening", "solve_course", "solve_fibre", "step_temperature",
+    "still_air_loss", "tension", "untwist", "with_tca", "write_tca",
 ]  # fmt: skip

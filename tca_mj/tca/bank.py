@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from tca_mj.checks import Array, door, every, floats, instance, shown, some, within
 from tca_mj.tca.arrays import column, frozen
+from tca_mj.tca.laws.creep import CreepBank, CreepSpec, CreepState
 from tca_mj.tca.laws.law import LawChoice, TensionLaw
 from tca_mj.tca.laws.plies import law_of
 from tca_mj.tca.laws.rod import CoilRods
@@ -75,6 +76,17 @@ class TcaState:
     energy_lost: Array
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class CreepingState(TcaState):
+    """State of n TCAs that creep.
+
+    Attributes:
+        shift: What their natural lengths have grown by, shape (..., n) [m].
+    """
+
+    shift: Array
+
+
 class Pull(NamedTuple):
     """Affine tension law of n TCAs about a length, each array of shape (..., n).
 
@@ -108,6 +120,7 @@ class TcaBank:
         law: What computes tension and stiffness.
         kind: What they are.
         heat: Thermal constants, fields of shape (n,).
+        creep: Creep of the TCAs, or None.
         supply: What a command means; by default it is a power.
         rest_length: Natural lengths, shape (n,) [m].
         minimum_length: Lengths at which the coils touch, shape (n,) [m].
@@ -130,7 +143,9 @@ class TcaBank:
     kind = "TCA"
 
     @door
-    def __init__(self, specs: Sequence[TcaSpec], law: LawChoice = "rod") -> None:
+    def __init__(
+        self, specs: Sequence[TcaSpec], law: LawChoice = "rod", creep: CreepSpec | None = None
+    ) -> None:
         """Gathers the constants of ``specs``, and their surfaces if ``law`` needs them.
 
         Args:
@@ -138,16 +153,26 @@ class TcaBank:
             law: "rod" solves rod theory anew each time; "surface" reads it from a table with a
                 known error (``surface.SurfaceBound``), made on first use: a third of the time.
                 A law of one's own is what makes a ``TensionLaw`` of the specs.
+            creep: Constants by which the natural lengths creep under tension and heat, and
+                tensions relax; None for none. The rod takes the place of the surface then.
 
         Raises:
-            ValueError: If ``specs`` is empty or there is no such ``law``.
+            ValueError: If ``specs`` is empty, there is no such ``law``, one of one's own or
+                several strands are to creep, or as ``CreepBank``.
             CalibrationError: If no table follows the rod of a TCA closely enough.
         """
         self.specs = tuple(specs)
         self.n = len(self.specs)
         if not callable(law) and law not in _LAWS:
             raise ValueError(f"law must be 'rod' or 'surface', got {law!r}")
+        if creep is not None:
+            if callable(law) or any(spec.plies is not None for spec in self.specs):
+                raise ValueError(
+                    f"creep must be None with a law of one's own or plies, got {shown(creep)}"
+                )
+            law = "rod"
         self.law = law
+        self.creep = None if creep is None else CreepBank(self.specs, creep)
         self._law = partial(law_of, law=law if callable(law) else _LAWS[law])
         self._coils = self._law(self.specs)
         for name in ("shortest", "longest", "tension"):
@@ -178,21 +203,22 @@ class TcaBank:
     def signals(self, state: TcaState, length: ArrayLike) -> dict[str, Signal]:
         """What TCAs show besides length and tension."""
         instance("state", state, TcaState)
-        return {
+        shown = {
             "temperature": Signal("°C", state.temperature),
             "body temperature": Signal("°C", state.body),
             "resistance": Signal("ohm", self.resistance(state, length, strict=False)),
         }
+        return shown | ({} if self.creep is None else {"creep": Signal("m", _shift(state))})
 
     @door
     def rest(self, batch_shape: tuple[int, ...] = ()) -> TcaState:
         """The state at ambient temperature with no energy counted, shape batch_shape + (n,)."""
         shape = (*batch_shape, self.n)
         ambient = np.broadcast_to(self.heat.ambient, shape)
-        return TcaState(
-            temperature=ambient.copy(), body=ambient.copy(), energy_in=np.zeros(shape),
-            energy_lost=np.zeros(shape),
-        )  # fmt: skip
+        values = ambient.copy(), ambient.copy(), np.zeros(shape), np.zeros(shape)
+        if self.creep is None:
+            return TcaState(*values)
+        return CreepingState(*values, shift=np.zeros(shape))
 
     def steady(self, temperature: ArrayLike) -> tuple[TcaState, Array]:
         """TCAs that have been at ``temperature`` for long, and the power that keeps them there.
@@ -251,6 +277,9 @@ class TcaBank:
         temperature = np.concatenate([state.temperature for state in states], axis=-1)
         lengths = np.concatenate(k * [length], axis=-1)
         law, parts = self._several[k]
+        if self.creep is not None:
+            assert isinstance(law, CoilRods)
+            law = self.creep.law(law, np.concatenate([_shift(s) for s in states], axis=-1), k)
         tension, stiffness = law.tension(lengths, temperature)
         return [Pull(tension[part], stiffness[part], length) for part in parts]
 
@@ -298,7 +327,13 @@ class TcaBank:
             worst = tuple(int(i) for i in np.argwhere(molten)[0])
             melting = float(self.melting_temperature[worst[-1]])
             raise TcaMelted(worst[-1], float(temperature[worst]), melting)
-        return TcaState(temperature, body, state.energy_in + power * dt, state.energy_lost + lost)
+        values = temperature, body, state.energy_in + power * dt, state.energy_lost + lost
+        if self.creep is None:
+            return TcaState(*values)
+        # The tension of the start and the mean temperature, over a period much shorter than creep.
+        shift, tension = CreepState(_shift(state)), self.pull(state, length).tension
+        warm = 0.5 * (state.temperature + temperature)
+        return CreepingState(*values, shift=self.creep.step(shift, tension, warm, dt).shift)
 
     def resistance(self, state: TcaState, length: ArrayLike, *, strict: bool = True) -> Array:
         """Resistance at given lengths, shape (..., n) [ohm]; as ``sensing.wire.resistance``."""
@@ -342,3 +377,14 @@ class TcaBank:
         if values.shape != shape:
             raise ValueError(f"{name} must have the state's shape {shape}, got {values.shape}")
         return values
+
+
+def _shift(state: TcaState) -> Array:
+    """What natural lengths have crept by [m].
+
+    Raises:
+        ValueError: If the state is of TCAs that do not creep.
+    """
+    instance("state", state, CreepingState)
+    shift: Array = state.shift  # type: ignore[attr-defined]
+    return shift

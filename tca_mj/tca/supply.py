@@ -1,8 +1,10 @@
-"""What a number for a TCA means: its power, voltage or current, or a temperature to be held.
+"""What a number for a TCA means: power, voltage, current, pulses, or a temperature to be held.
 
 A supply has limits. Those of voltage U and current I act through the resistance R of the TCA, which
-changes with its length and temperature: P <= U^2/R and P <= I^2 R. A thermostat computes the power
-for a temperature: what the heat loss takes, and what brings the TCA there within a response time.
+changes with its length and temperature: P <= U^2/R and P <= I^2 R. Pulses of the largest voltage
+heat for their duty, the share of the time that they are on, as those of a motor driver do (Sun,
+Section 2.3.2); they are much faster than any heat. A thermostat computes the power for a
+temperature: what the heat loss takes, and what brings the TCA there within a response time.
 """
 
 from __future__ import annotations
@@ -18,12 +20,14 @@ from numpy.typing import ArrayLike
 from tca_mj.checks import Array, Checked, Limits, Positives, within
 from tca_mj.tca.thermal import HeatSpec, power_from_voltage
 
-Quantity = Literal["power", "voltage", "current", "temperature"]
+Quantity = Literal["power", "voltage", "current", "duty", "temperature"]
 # A thermostat gives no power from so far above its limit on, and less over the last of it [K].
 # Estimates: the TCAs of the tasks anneal 8 K above their limit, and where the heat loss is the
 # nominal one they get no hotter than 1 K above it.
 _CUT_OUT, _LETTING_GO = 5.0, 4.0
-UNITS: dict[Quantity, str] = {"power": "W", "voltage": "V", "current": "A", "temperature": "°C"}
+UNITS: dict[Quantity, str] = {
+    "power": "W", "voltage": "V", "current": "A", "duty": "-", "temperature": "°C"
+}  # fmt: skip
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -81,8 +85,10 @@ class Thermostat(Checked):
 class Supply(Checked):
     """How the TCAs of a simulation are driven.
 
-    With ``temperature`` a thermostat holds each TCA there, as often as the TCAs are updated. A
-    temperature that is not above its idea of the surroundings' is off.
+    With ``duty`` the voltage is pulsed: ``max_voltage`` for the share of the time that is commanded,
+    0 to 1, and ``max_current`` limits a pulse. With ``temperature`` a thermostat holds each TCA
+    there, as often as the TCAs are updated. A temperature that is not above its idea of the
+    surroundings' is off.
 
     Attributes:
         quantity: What is commanded, one of ``UNITS``.
@@ -92,8 +98,8 @@ class Supply(Checked):
         thermostat: What holds temperatures; needed for them, and for nothing else.
 
     Raises:
-        ValueError: If the quantity is unknown, a limit is not above 0, or the thermostat is
-            missing.
+        ValueError: If the quantity is unknown, a limit is not above 0, or the thermostat, or the
+            voltage of pulses, is missing.
 
     Example:
         >>> from tca_mj import Simulation, Supply, bending_module
@@ -116,16 +122,22 @@ class Supply(Checked):
                 f"thermostat must be given for temperature and nothing else, got {self.thermostat}"
                 f" for {self.quantity}"
             )
+        if self.quantity == "duty":
+            within("max_voltage, of the pulses,", self.max_voltage)
 
     def checked(self, command: ArrayLike, n: int) -> Array:
         """A command, shape (n,), in the unit of the quantity.
 
         Raises:
-            ValueError: If the shape is another, or a number is not finite, or a power negative.
+            ValueError: If the shape is another, or a number is not finite, a power negative, or a
+                duty not 0 to 1.
         """
-        least = 0.0 if self.quantity == "power" else -math.inf
-        unit = UNITS[self.quantity]
-        return within(self.quantity, command, at_least=least, unit=unit, shape=(n,)).copy()
+        quantity, unit = self.quantity, UNITS[self.quantity].strip("-")
+        least = 0.0 if quantity in ("power", "duty") else -math.inf
+        most = 1.0 if quantity == "duty" else math.inf
+        return within(
+            quantity, command, at_least=least, at_most=most, unit=unit, shape=(n,)
+        ).copy()
 
     def power(
         self, command: Array, temperature: Array, body: Array, resistance: Callable[[], Array]
@@ -154,8 +166,8 @@ class Supply(Checked):
                 power = power_from_voltage(command, ohms)
             elif quantity == "current":
                 power = command**2 * ohms
-            power = np.minimum(power, np.square(volts) / ohms)
-            power = np.minimum(power, np.square(amperes) * ohms)
+            full = np.minimum(np.square(volts) / ohms, np.square(amperes) * ohms)
+            power = command * full if quantity == "duty" else np.minimum(power, full)
         most = self.max_power
         return power if isinstance(most, float) and most == math.inf else np.minimum(power, most)
 

@@ -1,4 +1,4 @@
-"""Creep, temporary length, hysteresis and ageing of TCAs: a small state that robots leave out.
+"""Creep, temporary length, hysteresis and ageing of TCAs: a small state, off unless asked for.
 
 A loaded TCA stretches at once and then creeps, for some 20 hours when cold and within seconds
 when hot; unloaded, it keeps a temporary length that recovers at the same rates [Sun, dissertation,
@@ -16,6 +16,7 @@ that of the coil with the crept natural length; it keeps its turns and its conta
         state = creep.step(state, tension, temperature, dt)
         tension, _ = CoilRods(creep.crept(state)).tension(length, temperature)
 
+``TcaBank(specs, creep=CreepSpec())`` and ``Simulation(part, creep=CreepSpec())`` do that with it.
 One relaxation time stands for what in nylon are many: the model has the order of the reported
 lengths and the two time scales, and not the shape of the curve between them. In it a steady
 weight gives no hysteresis, as its shift is steady, too; that is ``hysteresis_damping``.
@@ -206,6 +207,11 @@ class CreepBank:
             state = self.step(state, tension, hot, hot_time)
             state = self.step(state, tension, cold, cold_time)
         return state
+
+    def law(self, rods: CoilRods, shift: Array, times: int = 1) -> CoilRods:
+        """The law of these TCAs, so many side by side, at shifts (..., times n) [m]; unchecked."""
+        rest, fibre = np.tile(self._rest, times), np.tile(self._fibre_length, times)
+        return rods.crept((rest + shift) / fibre)
 
     @door
     def crept(self, state: CreepState) -> tuple[TcaSpec, ...]:

@@ -34,6 +34,7 @@ With the E/G = 5.5 of the catalogue that needs natural pitches above 0.88 rad, w
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import copy
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -144,6 +145,7 @@ class CoilRods:
         self._excess = 1.0 / (young * area) - self._shear
 
         sin, cos = np.sin(pitch), np.cos(pitch)
+        self._cosine = cos
         stiffness = self._torsion * cos**2 + self._bending * sin**2
         compliance = column(specs, "coil_radius") ** 2 / stiffness
         compliance += self._shear + sin**2 * self._excess
@@ -153,6 +155,28 @@ class CoilRods:
         self._onset = column(specs, "contact_smoothing") * self._minimum
         self.shortest = frozen(_SHORTEST * self._minimum)
         self.longest = frozen(_LONGEST * self._fibre_length)
+
+    def crept(self, sine: Array) -> CoilRods:
+        """The same coils at other natural lengths: they keep their turns and contact lengths.
+
+        Args:
+            sine: Natural length over the fibre's, shape (..., n); nothing is checked.
+
+        Returns:
+            Their law, of lengths and temperatures that have this shape, too.
+        """
+        rods, cos2 = copy(self), 1.0 - sine * sine
+        cos = np.sqrt(cos2)
+        rods._curvature, rods._twist = self._winding * cos, self._winding * sine
+        rods._tangent = self._winding * self._bending * rods._curvature
+        rods._torsion_per_tension = self._torsion_per_tension / self._cosine * cos
+        compliance = cos2 / np.square(self._winding)
+        compliance = compliance / (self._torsion * cos2 + self._bending * sine * sine)
+        compliance += self._shear + sine * sine * self._excess
+        rods.rest_stiffness = 1.0 / (self._fibre_length * compliance)
+        ratio = self.contact_stiffness / self.rest_stiffness
+        rods.contact_stiffness = ratio * rods.rest_stiffness
+        return rods
 
     def tension(self, length: ArrayLike, temperature: ArrayLike) -> tuple[Array, Array]:
         """Tension of the coils at given lengths and temperatures, and its slope.
