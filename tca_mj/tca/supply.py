@@ -85,8 +85,8 @@ class Thermostat(Checked):
 class Supply(Checked):
     """How the TCAs of a simulation are driven.
 
-    With ``duty`` the voltage is pulsed: ``max_voltage`` for the share of the time that is commanded,
-    0 to 1, and ``max_current`` limits a pulse. With ``temperature`` a thermostat holds each TCA
+    With ``duty`` the voltage is pulsed: ``max_voltage`` for that share of the time, 0 to 1, and
+    ``max_current`` limits a pulse. With ``temperature`` a thermostat holds each TCA
     there, as often as the TCAs are updated. A temperature that is not above its idea of the
     surroundings' is off.
 
