@@ -111,7 +111,7 @@ def follow_log(data: Data, tca: TcaSpec, ends: Spin | None = None) -> Followed:
             "data must be a course: time, and a power, voltage or current, got columns"
             f" {shown(list(data.columns))}"
         )
-    blank, columns = np.full(data.rows, np.nan), dict(data.columns)
+    blank, columns = np.zeros(data.rows), dict(data.columns)  # outcomes, which nothing reads
     held = length_is_given(data)
     for name in ("temperature", "resistance", "force" if held else length_name(data) or "length"):
         columns.setdefault(name, blank)
