@@ -131,6 +131,14 @@ def statistics() -> Path:
     return path
 
 
+def _logged() -> Any:
+    from tca_mj.tca.identify import Data
+
+    time = np.array([0.0, 0.5, 1.0])
+    columns = {"time": time, "voltage": 1.0 + time, "length": 0.05 - 1e-3 * time}
+    return Data(name="log.csv", columns=columns, fixed={"load": 0.1})
+
+
 @cache
 def _exported() -> tuple[Any, Any]:
     part = bending_module()
@@ -204,6 +212,7 @@ BY_SURFACE: dict[str, dict[str, Any]] = {
     "tca.sensing.wire.fit_displacement": {
         "resistance": [3.0, 3.1, 3.2, 3.3, 3.4], "displacement": [0.0, 1e-3, 2e-3, 3e-3, 4e-3],
     },
+    "tca.identify.logged.follow_log": {"data": lambda: _logged()},
     "tca.sensing.observer.TcaObserver.begin": {"temperature": 25.0},
     "tca.sensing.observer.TcaObserver.step": {"voltage": [1.0], "current": [0.3]},
     "tca.sensing.observer.TcaObserver.bound": {
@@ -441,7 +450,14 @@ def _samples() -> dict[Any, Callable[[], Any]]:
     from tca_mj.sim import Drive, Simulation
     from tca_mj.smp.lumped import LumpedModule
     from tca_mj.state import SimulationState, get_state
-    from tca_mj.tca.identify import Data, Identification, identify, read_data
+    from tca_mj.tca.identify import (
+        Data,
+        Followed,
+        Identification,
+        follow_log,
+        identify,
+        read_data,
+    )
 
     fibre = tca.CATALOGUE["free-stroke"]
     bank = cache(lambda: tca.TcaBank([fibre]))
@@ -492,6 +508,7 @@ def _samples() -> dict[Any, Callable[[], Any]]:
         tca.Surface: lambda: tca.calibrate(fibre), tca.ConicalTca: lambda: tca.CONICAL,
         tca.HeatSpec: lambda: bank().heat, tca.HeatStep: lambda: tca.HeatStep.of(bank().heat, 0.02),
         tca.Centreline: lambda: tca.Centreline.of_tca(fibre),
+        Followed: lambda: follow_log(_logged(), fibre),
         tca.TcaObserver: watching, tca.Estimate: lambda: watching().begin([3.0]),
         tca.Thermostat: lambda: tca.Thermostat(heat=bank().heat, max_power=2.0),
         tca.Supply: tca.Supply,

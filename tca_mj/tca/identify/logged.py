@@ -66,11 +66,11 @@ class Followed:
                 off = curves[name] - measured
                 worst = int(np.argmax(np.abs(off)))
                 unit, swing = SHOWN[name], float(np.ptp(measured))
-                share = f", {100.0 * rms(off) / swing:.1f} % of its range" if swing > 0.0 else ""
+                share = f", {100.0 * _rms(off) / swing:.1f} % of its range" if swing > 0.0 else ""
                 side = "above" if np.mean(off) > 0.0 else "below"
                 lines.append(
-                    f"{who}, {name}: off by {rms(off):.3g} {unit} (root of the mean square{share}),"
-                    f" at most by {abs(off[worst]):.3g} {unit} at {time[worst]:.4g} s;"
+                    f"{who}, {name}: off by {_rms(off):.3g} {unit} (root of the mean"
+                    f" square{share}), at most by {abs(off[worst]):.3g} {unit} at {time[worst]:.4g} s;"
                     f" on average {abs(np.mean(off)):.3g} {unit} {side} what was measured"
                 )
         if not lines:
@@ -83,7 +83,7 @@ class Followed:
         return replace(self.data, name=f"model of {self.data.name}", columns=columns, notes=())
 
 
-def rms(values: Array) -> float:
+def _rms(values: Array) -> float:
     """Root of the mean square [as the values]."""
     return float(np.sqrt(np.mean(np.square(values))))
 

@@ -90,7 +90,7 @@ class Estimate:
     Attributes:
         mean: Temperature [°C], that of the body [°C], length [m] and nominal over true heat
             loss [1], shape (4, ..., n).
-        covariance: Of their errors, shape (4, 4, ..., n).
+        covariance: Of their errors, shape (4, 4, ..., n) [products of those units].
     """
 
     mean: Array
