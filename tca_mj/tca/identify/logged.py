@@ -70,7 +70,8 @@ class Followed:
                 side = "above" if np.mean(off) > 0.0 else "below"
                 lines.append(
                     f"{who}, {name}: off by {_rms(off):.3g} {unit} (root of the mean"
-                    f" square{share}), at most by {abs(off[worst]):.3g} {unit} at {time[worst]:.4g} s;"
+                    f" square{share}), at most by {abs(off[worst]):.3g} {unit} at"
+                    f" {time[worst]:.4g} s;"
                     f" on average {abs(np.mean(off)):.3g} {unit} {side} what was measured"
                 )
         if not lines:
