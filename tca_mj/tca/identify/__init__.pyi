@@ -9,6 +9,7 @@ from tca_mj.tca.identify.identified import (
     Prediction,
     identify,
 )
+from tca_mj.tca.identify.logged import Followed, follow_log
 from tca_mj.tca.identify.reporting import report, sources, stated_errors, write_identification
 
 __all__ = [
