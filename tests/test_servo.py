@@ -8,6 +8,7 @@ from tca_mj.tca import (
     CATALOGUE,
     MODULE_TCAS,
     CoilSurfaces,
+    Estimate,
     Heating,
     Load,
     LoadedTcas,
@@ -137,6 +138,16 @@ def test_a_stroke_that_lags_is_made_up_for_without_being_known(servo):
                               swing * speed * np.sin(speed * time))  # fmt: skip
 
     assert width(closed) < 0.35 * width(open_loop)
+
+
+def test_the_thermostat_is_told_how_much_heat_is_lost(servo):
+    """At its goal a TCA gets what keeps it there: the nominal loss over r."""
+    warm, heat = np.array([80.0]), servo.observer.bank.heat
+    length = servo.observer.under_load(warm, np.array([WEIGHT]))
+    for ratio in (1.0, 0.5, 1.25):
+        mean = np.stack([warm, [25.0], length, [ratio]])
+        power = servo.position(Estimate(mean, np.zeros((4, 4, 1))), length)
+        assert power == pytest.approx(heat.loss * 55.0 / ratio, rel=1e-3)
 
 
 def test_what_a_servo_cannot_be_told(servo):

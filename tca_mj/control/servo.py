@@ -9,15 +9,17 @@ some tension, F(l, T) = F. A thermostat brings it there, with the temperature of
 
 The estimates lie on the law, and so the temperature that is wanted is the estimated one only where
 the estimated length is the wanted one: a heat loss that the observer does not know makes both
-temperatures wrong alike, and leaves no error of position. Of force it does, as a resistance does
-not tell heat from load (``tca.sensing.observer``). Friction that makes the stroke lag
-(``tca.laws.creep.hysteresis_damping``) acts on the load, not on the coil: it is part of the
-estimated tension, and so made up for without being known.
+temperatures wrong alike, and leaves no error of position, as long as the one that is believed is
+below the thermostat's limit. Of force it does, as a resistance does not tell heat from load
+(``tca.sensing.observer``). An observer that estimates the heat loss, too, tells the thermostat.
+
+Friction that makes the stroke lag (``tca.laws.creep.hysteresis_damping``) acts on the load, not on
+the coil: it is part of the estimated tension, and so made up for without being known.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -139,4 +141,7 @@ class TcaServo(Checked):
             ) from error
         hottest = float(np.max(self.thermostat.max_temperature))
         goal = goal_temperature(self.observer.bank, length, tension, hottest)
-        return self.thermostat.power(estimate.temperature, goal, estimate.body)
+        thermostat, loss = self.thermostat, estimate.loss
+        if (loss != 1.0).any():  # what keeps a temperature is what the observer says that is lost
+            thermostat = replace(thermostat, heat=thermostat.heat.losing(loss))
+        return thermostat.power(estimate.temperature, goal, estimate.body)

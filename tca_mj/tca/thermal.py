@@ -12,7 +12,7 @@ C + C_b and loss λ + λ_b.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Annotated, Any, NamedTuple, Self
 
@@ -72,6 +72,22 @@ class HeatSpec(Checked):
         series = np.asarray(self.conductance + self.body_loss)
         through = self.conductance * self.body_loss / np.where(series > 0.0, series, 1.0)
         return self.loss + through
+
+    @door
+    def losing(self, factor: ArrayLike) -> HeatSpec:
+        """The same with another heat loss, that of the TCA, to its body and from there to the air.
+
+        Args:
+            factor: On each of them, above 0, broadcast with them [1].
+
+        Raises:
+            ValueError: If a factor is not above 0 and finite.
+        """
+        factor = within("factor", factor, above=0.0)
+        return replace(
+            self, loss=self.loss * factor, conductance=self.conductance * factor,
+            body_loss=self.body_loss * factor,
+        )  # fmt: skip
 
     @door
     def steady_body(self, temperature: ArrayLike) -> Array:

@@ -46,7 +46,7 @@ from tca_mj.checks import (
 )
 from tca_mj.tca.bank import TcaBank, TcaState
 from tca_mj.tca.sensing import wire
-from tca_mj.tca.thermal import HeatSpec, HeatStep
+from tca_mj.tca.thermal import HeatStep
 
 _T, _BODY, _L, _R = range(4)
 _KELVIN, _METRE, _SHARE = 0.2, 1e-5, 1e-3  # of the differences
@@ -384,10 +384,10 @@ class TcaObserver:
         if self._adapts:
             ends = []
             for shift in (-_SHARE, _SHARE):
-                step = HeatStep.of(_losing(heat, 1.0 / (ratio + shift)), dt)
+                step = HeatStep.of(heat.losing(1.0 / (ratio + shift)), dt)
                 ends.append(np.stack(step.advance(warm, body, power)[:2]))
             jacobian[: _BODY + 1, _R] = (ends[1] - ends[0]) / (2.0 * _SHARE)
-            heat = _losing(heat, 1.0 / ratio)
+            heat = heat.losing(1.0 / ratio)
         step = HeatStep.of(heat, dt)
         after, after_body, _ = step.advance(warm, body, power)
         jacobian[_T, _T], jacobian[_T, _BODY] = 1.0 + step.own, step.taken
@@ -438,11 +438,3 @@ class TcaObserver:
         if values.shape[-1:] != (self.bank.n,):
             raise ValueError(f"{name} must have shape (..., {self.bank.n}), got {values.shape}")
         return values
-
-
-def _losing(heat: HeatSpec, factor: Array) -> HeatSpec:
-    """Thermal constants with another heat loss, as ``Variation.heat_loss`` has it."""
-    return replace(
-        heat, loss=heat.loss * factor, conductance=heat.conductance * factor,
-        body_loss=heat.body_loss * factor,
-    )  # fmt: skip
