@@ -103,3 +103,12 @@ def test_power_from_voltage():
     for voltage, resistance in ((math.nan, 1.0), (1.0, 0.0), (1.0, math.inf), (1.0, -1.0)):
         with pytest.raises(ValueError):
             power_from_voltage(voltage, resistance)
+
+
+def test_a_heat_loss_is_scaled_on_all_of_its_ways():
+    heat = HeatSpec(capacity=1.0, loss=0.2, conductance=0.3, body_loss=0.4, body_capacity=2.0)
+    more = heat.losing(1.5)
+    assert more.steady_loss == pytest.approx(1.5 * heat.steady_loss, rel=1e-12)
+    assert (more.capacity, more.body_capacity) == (heat.capacity, heat.body_capacity)
+    with pytest.raises(ValueError, match="factor must be finite and above 0"):
+        heat.losing(0.0)
