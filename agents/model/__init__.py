@@ -1,4 +1,4 @@
-"""Learned models of tasks: data sets of their steps, models fitted to them, control by prediction."""
+"""Learned models of tasks: data sets of steps, models fitted to them, control by prediction."""
 
 from tca_mj.lazy import offer
 

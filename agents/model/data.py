@@ -96,9 +96,7 @@ class Transitions(Checked):
                   "options": dict(self.options), "arguments": dict(self.arguments),
                   "made_for": dict(self.made_for)}  # fmt: skip
         found = {name: getattr(self, name) for name in (*_STEPS, "length", "seed")}
-        memory = io.BytesIO()
-        np.savez_compressed(memory, allow_pickle=False, header=np.array(json.dumps(header)), **found)
-        return write_whole(Path(path), memory.getvalue())
+        return packed(path, header, found)
 
     @classmethod
     @door
@@ -120,6 +118,13 @@ class Transitions(Checked):
             raise ValueError(f"{path} is no data set: {why(error)}") from error
 
 
+def packed(path: str | Path, header: Mapping[str, Any], found: Mapping[str, Any]) -> Path:
+    """Writes arrays by name, with a header that becomes JSON, into an ``.npz`` in one go."""
+    memory, said = io.BytesIO(), np.array(json.dumps(header))
+    np.savez_compressed(memory, allow_pickle=False, header=said, **found)
+    return write_whole(Path(path), memory.getvalue())
+
+
 def opened(path: str | Path, kind: str, newest: int) -> tuple[dict[str, Any], dict[str, Any]]:
     """Header and arrays of a file of this package; whatever is wrong with it is an exception.
 
@@ -139,7 +144,8 @@ def opened(path: str | Path, kind: str, newest: int) -> tuple[dict[str, Any], di
 
 
 def _width(made_for: Mapping[str, Any], table: str) -> int:
-    return sum(whole(f"size of {name}", row[0], at_least=1) for name, row in made_for[table].items())
+    rows = made_for[table].items()
+    return sum(whole(f"size of {name}", row[0], at_least=1) for name, row in rows)
 
 
 @door
@@ -206,9 +212,9 @@ def collect(
     hot = first.hot_temperature if hottest is None else hottest
     actors = [[actor(name, env) for name in policies] for env in tasks.envs]
     rows: list[list[tuple[Any, ...]]] = [[] for _ in range(episodes)]
-    seen, number, going = [np.zeros(0)] * tasks.num_envs, [-1] * tasks.num_envs, 0
-    disturbed: list[_Disturbed] = [None] * tasks.num_envs  # type: ignore[list-item]
-    begun = 0
+    number, begun, going = [-1] * tasks.num_envs, 0, 0
+    seen: list[Any] = [None] * tasks.num_envs
+    disturbed: list[Any] = [None] * tasks.num_envs
     with progress_bar(episodes, unit="episodes", progress=progress) as bar:
         while True:
             for i in range(tasks.num_envs):
@@ -222,7 +228,7 @@ def collect(
                 break
             running = np.array(number) >= 0
             actions = np.zeros(tasks.action_space.shape or (), dtype=np.float32)
-            for i in np.flatnonzero(running):
+            for i in np.flatnonzero(running).tolist():
                 actions[i] = disturbed[i].act(seen[i])
             for i, outcome in enumerate(tasks.advance(actions, running)):
                 if outcome is None:
@@ -266,4 +272,5 @@ class _Disturbed:
             self._level[k] = draw.uniform(-1.0, 1.0)
             self._share[k] = draw.uniform() * (draw.uniform() > _CALM)
         self._left -= 1
-        return np.float32(said + self._share * (self._level - said))
+        moved: NDArray[np.float32] = (said + self._share * (self._level - said)).astype(np.float32)
+        return moved

@@ -19,8 +19,6 @@ and its lift is ψ(d), the products of 2 to ``degree`` driven numbers. The kinds
 
 from __future__ import annotations
 
-import io
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property, partial
@@ -32,10 +30,9 @@ from typing import Annotated, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tca_mj.agents.model.data import opened
+from tca_mj.agents.model.data import opened, packed
 from tca_mj.agents.policies.archives import why
 from tca_mj.checks import Array, Checked, Positive, door, require_one_of, shown, whole, within
-from tca_mj.files import write_whole
 
 KINDS = ("split", "linear", "bilinear", "network")
 KIND, FORMAT = "model", 1
@@ -119,6 +116,11 @@ class View(Checked):
         ]
 
     @cached_property
+    def _repeated(self) -> NDArray[np.int64]:
+        """Which driven number each running mean is of."""
+        return np.tile(np.arange(self.sizes[0]), len(self.memories))
+
+    @cached_property
     def _factors(self) -> list[tuple[int, ...]]:
         numbers = range(self.sizes[0])
         return [
@@ -129,7 +131,7 @@ class View(Checked):
     @cached_property
     def _products(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         """Each product is a product that stands before it, or a number, times a number."""
-        places = {(i,): i for i in range(self.sizes[0])}
+        places: dict[tuple[int, ...], int] = {(i,): i for i in range(self.sizes[0])}
         places |= {factors: len(places) + i for i, factors in enumerate(self._factors)}
         pairs = [(places[factors[:-1]], factors[-1]) for factors in self._factors]
         first, second = np.array(pairs, dtype=np.int64).reshape(-1, 2).T
@@ -155,8 +157,7 @@ class View(Checked):
 
     def remember(self, driven: Array, means: Array) -> Array:
         """The running means after a step that began with these, shape (..., remembered)."""
-        repeated = np.tile(driven, len(self.memories))
-        return self.kept * means + (1.0 - self.kept) * repeated
+        return self.kept * means + (1.0 - self.kept) * driven[..., self._repeated]
 
     @door
     def states(self, seen: Array) -> Array:
@@ -231,48 +232,69 @@ class TaskModel(Checked):
             return states
         return np.concatenate([states, self.view.lift(states[..., : self.view.sizes[0]])], axis=-1)
 
-    def advance(self, state: Array, command: Array) -> Array:
+    def advance(self, state: Array, command: Array, off: Array | None = None) -> Array:
         """The state after a step.
 
         Args:
             state: As ``begin`` gives it, shape (..., n) [1].
             command: The action, shape (..., acts) [1].
+            off: What the robot does besides, of its driven and followed numbers, shape (seen,) [1].
         """
-        view = self.view
-        driven, remembered, followed = view.sizes
-        here = state[..., :driven]
-        means = view.remember(here, state[..., driven : driven + remembered])
-        after = driven + remembered
-        if self.kind == "split":
-            heat, body = self.weights
-            now = _affine(heat, state[..., :after], command)
-            then = _affine(body, state[..., after:], now, view.lift(now))
-            return np.concatenate([now, means, then], axis=-1)
-        if self.kind == "network":
-            hidden = np.concatenate([state, command], axis=-1)
-            for weight in self.weights[:-1]:
-                hidden = np.tanh(_affine(weight, hidden))
-            change = _affine(self.weights[-1], hidden)
-            now = here + change[..., :driven]
-            return np.concatenate([now, means, state[..., after:] + change[..., driven:]], axis=-1)
-        found = _affine(self.weights[0], *regressors(self.kind, state, command))
-        return np.concatenate([found[..., :driven], means, found[..., driven:]], axis=-1)
+        return self.predict(state, command[..., None, :], off)[..., 0, :]
 
-    def predict(self, state: Array, commands: Array) -> Array:
+    def predict(self, state: Array, commands: Array, off: Array | None = None) -> Array:
         """The states after each of several steps.
 
         Args:
             state: The first one, as ``begin`` gives it, shape (..., n) [1].
             commands: The actions, shape (..., steps, acts) [1].
+            off: As for ``advance``.
 
         Returns:
             Shape (..., steps, n); ``view.read`` has their rows.
         """
+        driven, remembered, followed = self.view.sizes
+        more = np.zeros(driven + followed) if off is None else off
+        each = np.moveaxis(commands, -2, 0)
+        if self.kind == "split":
+            return self._split(state, each, more)
         found = []
-        for command in np.moveaxis(commands, -2, 0):
-            state = self.advance(state, command)
+        for command in each:
+            here, apart = state[..., :driven], driven + remembered
+            means = self.view.remember(here, state[..., driven:apart])
+            if self.kind == "network":
+                hidden = np.concatenate([state, command], axis=-1)
+                for weight in self.weights[:-1]:
+                    hidden = np.tanh(_affine(weight, hidden))
+                now = np.concatenate([here, state[..., apart:]], axis=-1)
+                now += _affine(self.weights[-1], hidden)
+            else:
+                now = _affine(self.weights[0], *regressors(self.kind, state, command))
+            now[..., : more.size] += more
+            state = np.concatenate([now[..., :driven], means, now[..., driven:]], axis=-1)
             found.append(state)
         return np.stack(found, axis=-2)
+
+    def _split(self, state: Array, commands: Array, off: Array) -> Array:
+        """First all steps of what is driven, then of what follows: its lift is made at once."""
+        driven, remembered, _ = self.view.sizes
+        apart = driven + remembered
+        heat, body = self.weights
+        before, follows, heated = state[..., :apart], state[..., apart:], []
+        for command in commands:
+            now = _affine(heat, before, command) + off[:driven]
+            means = self.view.remember(before[..., :driven], before[..., driven:])
+            before = np.concatenate([now, means], axis=-1)
+            heated.append(before)
+        rows = np.stack(heated)
+        given = np.concatenate([rows[..., :driven], self.view.lift(rows[..., :driven])], axis=-1)
+        own = follows.shape[-1]
+        pushed = _affine(body[:, own:], given) + off[driven:]
+        followed = []
+        for push in pushed:
+            follows = follows @ body[:, :own].T + push
+            followed.append(follows)
+        return np.moveaxis(np.concatenate([rows, np.stack(followed)], axis=-1), 0, -2)
 
     @door
     def save(self, path: str | Path) -> Path:
@@ -282,10 +304,8 @@ class TaskModel(Checked):
             name: getattr(view, name)
             for name in ("made_for", "driven", "followed", "memories", "degree")
         }}  # fmt: skip
-        memory = io.BytesIO()
         named = {f"weight{i}": weight for i, weight in enumerate(self.weights)}
-        np.savez(memory, allow_pickle=False, header=np.array(json.dumps(header)), **named)
-        return write_whole(Path(path), memory.getvalue())
+        return packed(path, header, named)
 
     @classmethod
     @door

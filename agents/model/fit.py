@@ -82,7 +82,7 @@ def _least_squares(parts: Sequence[Array], target: Array, ridge: float) -> Array
     stacked = np.vstack([rows, np.diag(held)])
     aim = np.vstack([target, np.zeros((len(held), target.shape[1]))])
     # By QR first: the factor says the same in as many rows as there are columns.
-    joint = np.linalg.qr(np.hstack([stacked, aim]), mode="r")
+    joint: Any = np.linalg.qr(np.hstack([stacked, aim]), mode="r")
     width = rows.shape[1]
     return np.linalg.lstsq(joint[:width, :width], joint[:width, width:], rcond=None)[0].T
 
@@ -119,7 +119,9 @@ def _perceptron(seen: Array, target: Array, hidden: Sequence[int], epochs: int, 
             loss.backward()
             optimiser.step()
             falling.step()
-    plain: list[Any] = [[figure.detach().numpy().astype(float) for figure in l] for l in layers]
+    plain: list[Any] = [
+        [figure.detach().numpy().astype(float) for figure in layer] for layer in layers
+    ]
     plain[0] = [plain[0][0] / spread, plain[0][1] - plain[0][0] @ (centre / spread)]
     plain[-1] = [plain[-1][0] * size[:, None], plain[-1][1] * size]
     return tuple(np.column_stack(layer) for layer in plain)
