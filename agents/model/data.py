@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from tca_mj.agents.policies import Policy, actor, arguments_of, contract
 from tca_mj.agents.policies.archives import LARGEST, LONGEST, arrays, content_of, why
 from tca_mj.agents.progress import progress_bar
-from tca_mj.checks import Checked, Count, Seed, door, text, whole, within
+from tca_mj.checks import Checked, Count, Seed, door, number, quantity, shown, text, whole, within
 from tca_mj.envs.vector import TaskVector
 from tca_mj.files import write_whole
 from tca_mj.registry import Envs, EpisodeSteps, episode_steps, find_task, task_class
@@ -47,10 +47,13 @@ class Transitions(Checked):
         terminated, truncated: Whether it ended the episode, shape (n,).
         length: Number of steps of each episode, shape (episodes,).
         seed: Seed of each episode.
+        made_for: The contract of the task, see ``tca_mj.agents.policies.contract``.
         policies: Who acted, below the disturbances, in one episode after the other, by turns.
         options: Options of every reset.
         arguments: What the task was made with.
-        made_for: The contract of the task, see ``tca_mj.agents.policies.contract``.
+
+    Raises:
+        ValueError: If shapes do not fit or numbers are not finite.
     """
 
     task: str
@@ -62,10 +65,10 @@ class Transitions(Checked):
     truncated: NDArray[np.bool_]
     length: NDArray[np.int64]
     seed: NDArray[np.int64]
+    made_for: Mapping[str, Any]
     policies: tuple[str, ...] = ("off",)
     options: Mapping[str, Any] = field(default_factory=dict)
     arguments: Mapping[str, Any] = field(default_factory=dict)
-    made_for: Mapping[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         Checked.__post_init__(self)
@@ -79,7 +82,7 @@ class Transitions(Checked):
     @property
     def period(self) -> float:
         """Time of a step [s]."""
-        return float(self.made_for["timing"]["control_period"])
+        return period_of(self.made_for)
 
     def episodes(self) -> Iterator[tuple[NDArray[np.float64], NDArray[np.float64]]]:
         """Of each episode what was seen, shape (steps + 1, seen), and done, shape (steps, acts)."""
@@ -143,9 +146,47 @@ def opened(path: str | Path, kind: str, newest: int) -> tuple[dict[str, Any], di
     return header, found
 
 
+def rows_of(made_for: Mapping[str, Any], table: str) -> dict[str, tuple[int, float, float]]:
+    """Size, centre and scale of each row of a table; what has no scale is taken as it is.
+
+    Args:
+        made_for: The contract of a task.
+        table: ``observation`` or ``action``.
+
+    Raises:
+        ValueError: If it is no contract.
+    """
+    try:
+        return {
+            str(name): (
+                whole(f"size of {name}", size, at_least=1, at_most=10_000),
+                number(f"centre of {name}", centre),
+                quantity(f"scale of {name}", 1.0 if scale is None else scale, above=0.0),
+            )
+            for name, (size, _, centre, scale) in made_for[table].items()
+        }
+    except (LookupError, TypeError, AttributeError) as error:
+        raise ValueError(
+            f"made_for must be the contract of a task with its {table}, got {shown(made_for)}"
+        ) from error
+
+
+def period_of(made_for: Mapping[str, Any]) -> float:
+    """Time of a step of a task by its contract [s].
+
+    Raises:
+        ValueError: If it is no contract.
+    """
+    try:
+        return quantity("control_period", made_for["timing"]["control_period"], above=0.0)
+    except (LookupError, TypeError) as error:
+        raise ValueError(
+            f"made_for must be the contract of a task with its timing, got {shown(made_for)}"
+        ) from error
+
+
 def _width(made_for: Mapping[str, Any], table: str) -> int:
-    rows = made_for[table].items()
-    return sum(whole(f"size of {name}", row[0], at_least=1) for name, row in rows)
+    return sum(size for size, _, _ in rows_of(made_for, table).values())
 
 
 @door

@@ -30,7 +30,7 @@ from typing import Annotated, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tca_mj.agents.model.data import opened, packed
+from tca_mj.agents.model.data import opened, packed, period_of, rows_of
 from tca_mj.agents.policies.archives import why
 from tca_mj.checks import Array, Checked, Positive, door, require_one_of, shown, whole, within
 
@@ -65,12 +65,13 @@ class View(Checked):
 
     def __post_init__(self) -> None:
         Checked.__post_init__(self)
-        rows = self.made_for["observation"]
+        rows = rows_of(self.made_for, "observation")
         chosen = (*self.driven, *self.followed)
         if not self.driven or len(set(chosen)) != len(chosen) or not set(chosen) <= set(rows):
             raise ValueError(
                 f"driven and followed must be different rows of {list(rows)}, got {shown(chosen)}"
             )
+        within("control_period and size of action", [self.period, self.acts], above=0.0)
         size = self.sizes[0]
         numbers = comb(size + self.degree, self.degree) + sum(self.sizes[1:])
         if numbers > MOST:
@@ -83,37 +84,32 @@ class View(Checked):
     def _columns(self) -> Array:
         """Of each number that is seen its place, centre and scale, shape (3, n)."""
         found, start = {}, 0
-        for name, (size, _, centre, scale) in self.made_for["observation"].items():
-            whole(f"size of {name}", size, at_least=1)
-            low = within(f"centre of {name}", 0.0 if centre is None else centre)
-            one = within(f"scale of {name}", 1.0 if scale is None else scale, above=0.0)
-            found[name] = [(start + i, float(low), float(one)) for i in range(size)]
+        for name, (size, centre, scale) in rows_of(self.made_for, "observation").items():
+            found[name] = [(start + i, centre, scale) for i in range(size)]
             start += size
         return np.array([c for n in (*self.driven, *self.followed) for c in found[n]]).T
 
     @cached_property
     def sizes(self) -> tuple[int, int, int]:
         """Numbers of a state: driven, remembered and followed."""
-        rows = self.made_for["observation"]
+        rows = rows_of(self.made_for, "observation")
         driven, followed = (sum(rows[n][0] for n in ns) for ns in (self.driven, self.followed))
         return driven, driven * len(self.memories), followed
 
     @property
     def acts(self) -> int:
         """Numbers of an action."""
-        return sum(row[0] for row in self.made_for["action"].values())
+        return sum(row[0] for row in rows_of(self.made_for, "action").values())
 
     @property
     def period(self) -> float:
         """Time of a step [s]."""
-        return float(self.made_for["timing"]["control_period"])
+        return period_of(self.made_for)
 
     @cached_property
     def kept(self) -> Array:
         """Share of the running means that a step leaves, one for each, shape (remembered,)."""
-        return np.repeat(np.exp(-self.period / np.array(self.memories or [1.0])), self.sizes[0])[
-            : self.sizes[1]
-        ]
+        return np.repeat(np.exp(-self.period / np.array(self.memories)), self.sizes[0])
 
     @cached_property
     def _repeated(self) -> NDArray[np.int64]:
@@ -209,6 +205,8 @@ class TaskModel(Checked):
     def __post_init__(self) -> None:
         Checked.__post_init__(self)
         view = self.view
+        if not all(np.ndim(weight) == 2 for weight in self.weights):
+            raise ValueError(f"weights must be matrices, got {shown(self.weights)}")
         driven, remembered, followed = view.sizes
         lifted = len(view._factors)
         state, acts = driven + remembered + followed, view.acts

@@ -67,10 +67,10 @@ def fit_model(data: Transitions, view: View, kind: Kind = "split", *, ridge: Not
 def require_same(data: Transitions, view: View) -> None:
     """Refuses a view of a task that is not the one of the data."""
     for part in ("observation", "action", "timing"):
-        if view.made_for[part] != data.made_for[part]:
+        if view.made_for.get(part) != data.made_for.get(part):
             raise ValueError(
                 f"view must be of the task of the data, got another {part}:"
-                f" {shown(view.made_for[part])}"
+                f" {shown(view.made_for.get(part))}"
             )
 
 

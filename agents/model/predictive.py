@@ -270,11 +270,11 @@ class Predictive:
     def act(self, observation: NDArray[np.float32]) -> NDArray[np.float32]:
         """The action for the next control period."""
         horizon, scale = self.horizon, self.scale
-        times: Array = self.period * (self._step + 1.0 + np.arange(horizon.steps))
+        ahead_of = np.arange(self._step + 1, self._step + 1 + horizon.steps, dtype=np.float64)
         ahead = self.foresight.look(observation, lambda rows: self.output(rows) / scale,
                                     self.excess)  # fmt: skip
         still: Array = self.still.astype(np.float64)
-        wanted = np.asarray(self.wanted(times) / scale, dtype=np.float64)
+        wanted = np.asarray(self.wanted(self.period * ahead_of) / scale, dtype=np.float64)
         plan = planned(ahead, wanted, horizon, before=self._before,
                        guess=self._plan, still=still)  # fmt: skip
         action = plan[0].astype(np.float32)
