@@ -35,6 +35,7 @@ from hypothesis import strategies as st
 import tca_mj
 from tca_mj.agents.evaluate import Evaluation
 from tca_mj.agents.finished import EPISODES, kept
+from tca_mj.agents.model import TaskModel, Transitions
 from tca_mj.agents.policies import Preprocessing, SavedPolicy, Statistics, load_policy
 from tca_mj.agents.sweep import RESULT, TRIALS, Sweep, run_sweep
 from tca_mj.agents.train.config import TrainConfig
@@ -250,6 +251,10 @@ READERS: dict[str, Reader] = {
     "bench.csv": Reader(lambda: bench_file().read_bytes(),
                         lambda path: read_data(path, good(tca_mj.TcaSpec)), ".csv"),
     "tca.json": Reader(lambda: muscle().read_bytes(), read_tca, ".json"),
+    "steps.npz": Reader(lambda: good(Transitions).save("whole.npz").read_bytes(),
+                        Transitions.read, ".npz"),
+    "task-model.npz": Reader(lambda: good(TaskModel).save("whole.npz").read_bytes(),
+                             TaskModel.read, ".npz"),
     "statistics.npz": Reader(lambda: statistics().read_bytes(), Statistics.read, ".npz"),
     "recording.rrd": Reader(lambda: recorded().read_bytes(), read, ".rrd"),
     RUN: Reader(lambda: _written(RUN), lambda path: _run(path, RUN), ".json"),

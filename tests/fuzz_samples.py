@@ -24,6 +24,7 @@ from numpy.typing import ArrayLike
 
 import tca_mj
 from tca_mj import checks, control, rod, variation
+from tca_mj.agents.model import TaskModel, Transitions, View
 from tca_mj.agents.policies.network import Network
 from tca_mj.agents.train.config import OffPolicy
 from tca_mj.assets import mjcf
@@ -335,6 +336,24 @@ BY_SURFACE: dict[str, dict[str, Any]] = {
     "agents.train.gait_space.GaitSpace.encode": {"steering": (0.0,) * 4},
     "agents.train.gait_space.GaitSpace.decode": {"point": [0.5] * 28},
     "agents.train.gait_space.GaitSpace.fold": {"point": [0.5] * 28},
+    "agents.model.data.collect": {
+        "task": TASK, "**": lambda: {"episodes": 1, "steps": 3, "threads": 1},
+    },
+    "agents.model.data.Transitions": {
+        field.name: lambda name=field.name: getattr(good(Transitions), name)
+        for field in fields(Transitions)
+    },
+    "agents.model.data.Transitions.read": {"path": lambda: good(Transitions).save("steps.npz")},
+    "agents.model.dynamics.View": {
+        "made_for": lambda: good(View).made_for, "driven": ("TCA temperature",),
+    },
+    "agents.model.dynamics.TaskModel": {
+        "kind": "split", "weights": lambda: good(TaskModel).weights,
+    },
+    "agents.model.dynamics.TaskModel.read": {"path": lambda: good(TaskModel).save("fitted.npz")},
+    "agents.model.fit.prediction_errors": {
+        "steps": 2, "output": lambda: lambda rows: rows["TCA temperature"],
+    },
     "registry.make": {"task": TASK}, "registry.find_task": {"task": TASK},
     "registry.task_class": {"task": TASK}, "registry.recipes": {"task": TASK},
     "registry.episode_steps": {"task": TASK},
@@ -430,6 +449,8 @@ def _samples() -> dict[Any, Callable[[], Any]]:
     from tca_mj import actuation, smp, tca
     from tca_mj.agents.episode import Episode
     from tca_mj.agents.evaluate import Evaluation
+    from tca_mj.agents.model import ByModel, Horizon, collect, fit_model
+    from tca_mj.agents.model.predictive import Foresight
     from tca_mj.agents.policies import Policy, SavedPolicy, shipped
     from tca_mj.agents.policies.actors import Script, actor
     from tca_mj.agents.scripts.tetrapod import WALK
@@ -490,8 +511,17 @@ def _samples() -> dict[Any, Callable[[], Any]]:
 
     measured = cache(lambda: read_data(bench_file(), fibre))
     identified = cache(lambda: identify([measured()], fibre, free=["shear"], compare=False))
+    @cache
+    def steps() -> Transitions:
+        return collect(TASK, episodes=2, steps=4, arguments={"action": "power"}, threads=1)
+
+    def view() -> View:
+        return View(made_for=steps().made_for, driven=("TCA temperature",))
+
     muscles = [fibre]
     return {
+        Transitions: steps, View: view, TaskModel: lambda: fit_model(steps(), view()),
+        Foresight: lambda: ByModel(fit_model(steps(), view())), Horizon: Horizon,
         Data: measured, Identification: identified,
         tca.TcaSpec: lambda: fibre, tca.FibreSpec: lambda: fibre.fibre,
         tca.FibreSpec | tca.FibreTable: lambda: fibre.fibre,

@@ -69,6 +69,10 @@ NO_DOOR = {
             "tca.dynamics.stepping.LoadedTcas.pull", "tca.supply.Supply.power",
             "tca.dynamics.stepping.LoadedTcas.check_domain", "tca.bank.TcaBank.pulls",
             "tca.supply.Supply.like", "actuation",
+            *(f"agents.model.dynamics.{name}" for name in (
+                "View.lift", "View.scaled", "View.remember", "View.read", "View.states",
+                "TaskModel.begin", "TaskModel.advance", "TaskModel.predict",
+            )),
             "smp.bank.SpineBank.advance", "envs.options.Uniform.__call__",
             "envs.options.Constant.__call__",
         ),
@@ -76,6 +80,7 @@ NO_DOOR = {
     ),
     **dict.fromkeys(
         (
+            "agents.model.predictive.*", "agents.model.predictive.Predictive",
             "agents.policies.files.NetworkPolicy", "agents.policies.files.ResidualPolicy",
             "agents.policies.files.with_clock", "agents.policies.gait.GaitPolicy.act",
             "agents.policies.network.Network.__call__", "agents.scripts.arm.PickAndPlace.act",
@@ -442,7 +447,7 @@ class Case:
 
 
 # How a file is refused: by its path, with what is wrong with it.
-_OF_A_FILE = re.compile(r"is no (policy|model)|has no statistics|must be trusted")
+_OF_A_FILE = re.compile(r"is no (policy|model|data set)|has no statistics|must be trusted")
 _FILES = ("spoilt", "path", "source", "part", "run.json", "state.pkl", "result.json")
 
 

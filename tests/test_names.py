@@ -73,6 +73,10 @@ INTERNAL = {
         "cluster": "*", "evaluate": "endings report", "finished": "begun keep",
         "output": "*", "progress": "*", "workers": "*",
     },
+    "tca_mj.agents.model": {
+        "data": "opened packed period_of rows_of", "dynamics": "regressors",
+        "fit": "require_same", "predictive": "Foresight nothing planned",
+    },
     "tca_mj.agents.policies": {
         "actors": "called", "archives": "*", "load": "require_untold", "onnx": "*",
     },

@@ -16,7 +16,19 @@ from numpy.typing import NDArray
 from tca_mj.agents.policies import Policy, actor, arguments_of, contract
 from tca_mj.agents.policies.archives import LARGEST, LONGEST, arrays, content_of, why
 from tca_mj.agents.progress import progress_bar
-from tca_mj.checks import Checked, Count, Seed, door, number, quantity, shown, text, whole, within
+from tca_mj.checks import (
+    Checked,
+    Count,
+    Seed,
+    door,
+    flags,
+    number,
+    quantity,
+    shown,
+    text,
+    whole,
+    within,
+)
 from tca_mj.envs.vector import TaskVector
 from tca_mj.files import write_whole
 from tca_mj.registry import Envs, EpisodeSteps, episode_steps, find_task, task_class
@@ -76,8 +88,10 @@ class Transitions(Checked):
         within("seed", self.seed, at_least=0.0, shape=self.length.shape)
         seen, acts = (_width(self.made_for, name) for name in ("observation", "action"))
         widths = {"observation": (seen,), "next_observation": (seen,), "action": (acts,)}
-        for name in _STEPS:
-            within(name, getattr(self, name) * 1.0, shape=(count, *widths.get(name, ())))
+        for name, kind in _STEPS.items():
+            value, shape = getattr(self, name), (count, *widths.get(name, ()))
+            number_of = flags(name, value) * 1.0 if kind == "?" else value
+            within(name, number_of, shape=shape)
 
     @property
     def period(self) -> float:

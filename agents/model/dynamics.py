@@ -155,7 +155,6 @@ class View(Checked):
         """The running means after a step that began with these, shape (..., remembered)."""
         return self.kept * means + (1.0 - self.kept) * driven[..., self._repeated]
 
-    @door
     def states(self, seen: Array) -> Array:
         """States of an episode.
 

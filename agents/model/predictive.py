@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 
 from tca_mj.agents.model.dynamics import TaskModel
-from tca_mj.checks import Array, Checked, Count, NotNegative, Positive, door, whole, within
+from tca_mj.checks import Array, Checked, Count, NotNegative, Positive, Positives, door, whole
 from tca_mj.envs.task import SimulatedTask
 from tca_mj.sim import SimulationDiverged
 
@@ -232,7 +232,7 @@ def nothing(rows: Rows) -> Array:
 
 
 @dataclass
-class Predictive:
+class Predictive(Checked):
     """A policy that follows a course of outputs, which it knows ahead.
 
     Attributes:
@@ -249,7 +249,7 @@ class Predictive:
     foresight: Foresight
     output: Output
     wanted: Callable[[Array], Array]
-    scale: Any
+    scale: Positives
     still: NDArray[np.float32]
     period: float
     horizon: Horizon = field(default_factory=Horizon)
@@ -257,7 +257,7 @@ class Predictive:
     phase = "predictive"
 
     def __post_init__(self) -> None:
-        self.scale = within("scale", self.scale, above=0.0)
+        Checked.__post_init__(self)
         self.reset()
 
     def reset(self) -> None:
