@@ -56,6 +56,7 @@ MODELS = {
 BEST = "split, degree 6"
 HORIZON = Horizon(effort=1e-3, change=1e-3)
 SHORT = Horizon(holds=(2, 3, 5), effort=1e-3, change=1e-3, rounds=1, probe=0.05)
+AVERAGING = 0.05  # time in which it learns what is off, where nothing has noise [s]
 HOT = 135.0  # from where on prediction keeps away [°C]
 WARM = 70.0  # of a TCA that has nothing to do, in the inverse of the model [°C]
 _SIDES = -2.0 * np.pi / 3.0 * np.arange(3)
@@ -353,7 +354,7 @@ def follower(who: str, goal: str, number: int) -> Any:
         return Pi(gains, output, course, inverse(goal, number)[0])
     if who == "learned (SAC)":
         return Learned(inverse(goal, number)[1])
-    by, horizon = {"model": (ByModel(model(BEST)), HORIZON),
+    by, horizon = {"model": (ByModel(model(BEST), AVERAGING), HORIZON),
                    "network": (ByModel(model("network")), HORIZON),
                    "simulation": (BySimulation(ENV), SHORT)}[who.split()[-1]]  # fmt: skip
     return Predictive(by, output, course, 1.0, ACTION.still, DT, horizon, too_hot)

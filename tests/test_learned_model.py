@@ -356,12 +356,14 @@ def test_what_is_too_hot_is_cut_off():
 
 def test_the_task_tells_where_commands_lead_and_is_left_alone():
     env = BendReach(action="power")
+    foresight = BySimulation(env)
     observation, _ = env.reset(seed=2)
+    foresight.reset()
     for _ in range(5):
         observation, *_ = env.step(np.array([0.5, -1.0, 0.0], np.float32))
     before = env.sim.data.qpos.copy(), env.sim.temperature.copy()
-    ahead = BySimulation(env).look(observation, lambda rows: rows["tip position"],
-                                   lambda rows: rows["TCA temperature"])  # fmt: skip
+    ahead = foresight.look(observation, lambda rows: rows["tip position"],
+                           lambda rows: rows["TCA temperature"])  # fmt: skip
     commands = np.random.default_rng(0).uniform(-1.0, 0.5, (2, 4, 3))
     tips, temperatures = ahead(commands)
     assert (env.sim.data.qpos == before[0]).all() and (env.sim.temperature == before[1]).all()

@@ -190,15 +190,17 @@ class BySimulation:
 
     @door
     def __init__(self, task: SimulatedTask) -> None:
-        self.task, self._copy = task, deepcopy(task)
-        self._state: Any = None
+        self.task = task
+        self.reset()
 
     def reset(self) -> None:
-        """Nothing is remembered."""
+        """Gives up the copy, which the next episode makes anew."""
+        self._copy: SimulatedTask | None = None
+        self._state: Any = None
 
     def look(self, observation: NDArray[np.float32], output: Output, excess: Output) -> Ahead:
         """See ``Foresight``; what the simulation does not survive stays as it was before."""
-        copy = self._copy
+        copy = self._copy = self._copy or deepcopy(self.task)
         state = self._state = self.task.get_state(self._state)
 
         def tried(commands: Array) -> list[NDArray[np.float32]]:

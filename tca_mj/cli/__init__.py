@@ -26,6 +26,7 @@ examples:
   tca-mj view {task}               watch it in a window
   tca-mj train TASK --algo sac                  learn a task
   tca-mj eval scripted --task TASK              how good a policy is
+  tca-mj collect TASK --out FILE                what a task does under any commands, as data
   tca-mj bench --out runs/bench                 how fast it is on this machine
   tca-mj validate tca --out runs/validation     the models against what is published
   tca-mj certify --out runs/certificate         the chains against the theory of rods
