@@ -10,7 +10,7 @@ takes 20 minutes of one core.
 import json
 import time
 from collections.abc import Callable, Sequence
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -376,7 +376,7 @@ def followed(goal: str, who: str, number: int, off: bool) -> dict[str, Any]:
 
 def tracking(goal: str) -> str:
     """Who follows how well, as Markdown."""
-    rows, unit = [], {"angle": "°", "path": "mm"}[goal]
+    rows, unit = [], "mm" if goal == "path" else "°"
     for who in WHO:
         slow = who in WHO[-2:]  # these run the first course alone
         for off in (False,) if slow else (False, True):
@@ -396,7 +396,7 @@ def tracking(goal: str) -> str:
 
 
 def picture(path: Path) -> None:
-    """A prediction; an angle and a path that are followed."""
+    """A prediction; an angle that jumps and a path that is followed."""
     figure = Figure(figsize=(13.5, 4.2), layout="constrained")
     ahead, angle, way = figure.subplots(1, 3)
     test = data("test", episodes=40, seed=5000)
@@ -411,16 +411,16 @@ def picture(path: Path) -> None:
         state = model(name).begin(view.states(seen[:101])[-1])
         rows = view.read(model(name).predict(state, done[100:300])[..., : sum(view.sizes)])
         ahead.plot(clock, bend(rows), color=colour, lw=1.2, label=name)
-    ahead.set(xlabel="time since the prediction [s]", ylabel="bend [°]", ylim=(0.0, 110.0))
+    ahead.set(xlabel="time since the prediction [s]", ylabel="bend [°]", ylim=(0.0, 80.0))
     who = {"PI": ORANGE, "learned (SAC)": PURPLE, "prediction by the split model": BLUE}
-    for axes, goal in ((angle, "angle"), (way, "path")):
+    for axes, goal in ((angle, "jumps"), (way, "path")):
         course = GOALS[goal][2][0](DT * (np.arange(STEPS) + 1.0))
         t = DT * (np.arange(STEPS) + 1.0)
-        pair = (t, course[:, 0]) if goal == "angle" else course.T
+        pair = (t, course[:, 0]) if goal == "jumps" else course[50:].T
         axes.plot(*pair, color=GREY, lw=4, alpha=0.5, label="wanted")
         for name, colour in who.items():
             found = np.array(followed(goal, name, 0, False)["outputs"])
-            pair = (t, found[:, 0]) if goal == "angle" else found[50:].T
+            pair = (t, found[:, 0]) if goal == "jumps" else found[50:].T
             axes.plot(*pair, color=colour, lw=1.2, label=name)
     angle.set(xlabel="time [s]", ylabel="bend towards x [°]", xlim=(0.0, 30.0))
     way.set(xlabel="tip, x [mm]", ylabel="y [mm]", aspect="equal")
@@ -432,7 +432,7 @@ def picture(path: Path) -> None:
 def main() -> None:
     out = folder_of_pictures(__doc__, Path("docs/pictures"))
     if out is None:
-        for block in (predictions, lambda: tracking("angle"), lambda: tracking("path")):
+        for block in (predictions, *(partial(tracking, goal) for goal in GOALS)):
             print(block(), flush=True, end="\n\n")
     else:
         picture(out / "learned_model.png")
