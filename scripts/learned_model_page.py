@@ -377,7 +377,7 @@ def followed(goal: str, who: str, number: int, off: bool) -> dict[str, Any]:
 def tracking(goal: str) -> str:
     """Who follows how well, as Markdown."""
     rows, unit = [], "mm" if goal == "path" else "°"
-    for who in WHO:
+    for who in WHO[:-1] if goal == "jumps" else WHO:
         slow = who in WHO[-2:]  # these run the first course alone
         for off in (False,) if slow else (False, True):
             count = 1 if slow else len(GOALS[goal][2])
