@@ -6,6 +6,7 @@ import math
 import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict
+from itertools import cycle
 from pathlib import Path
 from typing import Any
 
@@ -24,7 +25,7 @@ _NOTHING = 1e-6  # error below which there is no order to measure, and none is d
 _FIELDS = ("position", "rotation")
 _SHADES = {"hanging": "#0072b2", "lying": "#d55e00", "standing": "#8a4fa3"}
 _COLOURS = ("#0072b2", "#d55e00", "#009e73", "#8a4fa3", "#56b4e9", "#b8860b", "#555555", "#cc3377",
-            "#88aa00", "#003f7f", "#ff9955", "#44ccaa", "#bb99ee", "#aa7755")  # fmt: skip
+            "#88aa00", "#003f7f", "#ff9955", "#44ccaa", "#bb99ee", "#aa7755", "#e6a0c4")  # fmt: skip
 _ABREAST = 5  # modules side by side in a figure
 _FIGURES = {
     "bend": "Error of the tip's place and rotation over its bend, at the default nodes. Dashed:"
@@ -281,7 +282,7 @@ def _nodes(figure: Any, rows: Mapping[str, Sequence[Outcome]]) -> None:
     axes = figure.subplots(1, 2)
     labels = "error of the tip [1/L]", "error of its rotation [rad]"
     for axis, field, label in zip(axes, _FIELDS, labels, strict=True):
-        for colour, (name, every) in zip(_COLOURS, rows.items(), strict=False):
+        for colour, (name, every) in zip(cycle(_COLOURS), rows.items(), strict=False):
             nodes = np.array(TIMES) * SUBJECTS[name]().nodes[0]
             errors = np.array([each for each in _finer(every, field) if max(each) > _NOTHING])
             if errors.size:
