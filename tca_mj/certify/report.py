@@ -25,7 +25,7 @@ _NOTHING = 1e-6  # error below which there is no order to measure, and none is d
 _FIELDS = ("position", "rotation")
 _SHADES = {"hanging": "#0072b2", "lying": "#d55e00", "standing": "#8a4fa3"}
 _COLOURS = ("#0072b2", "#d55e00", "#009e73", "#8a4fa3", "#56b4e9", "#b8860b", "#555555", "#cc3377",
-            "#88aa00", "#003f7f", "#ff9955", "#44ccaa", "#bb99ee", "#aa7755", "#e6a0c4")  # fmt: skip
+            "#88aa00", "#003f7f", "#ff9955", "#44ccaa", "#bb99ee", "#aa7755")  # fmt: skip
 _ABREAST = 5  # modules side by side in a figure
 _FIGURES = {
     "bend": "Error of the tip's place and rotation over its bend, at the default nodes. Dashed:"
