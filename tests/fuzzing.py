@@ -68,6 +68,7 @@ NO_DOOR = {
             "tca.dynamics.stepping.LoadedTcas.heated",
             "tca.dynamics.stepping.LoadedTcas.pull", "tca.supply.Supply.power",
             "tca.dynamics.stepping.LoadedTcas.check_domain", "tca.bank.TcaBank.pulls",
+            "tca.laws.creep.CreepBank.law",
             "tca.supply.Supply.like", "actuation",
             *(f"agents.model.dynamics.{name}" for name in (
                 "View.lift", "View.scaled", "View.remember", "View.read", "View.states",

@@ -408,7 +408,10 @@ def test_feet_land_without_sinking_in(envs, gait, steps, monkeypatch):
     assert len(walked) == round(0.1 / timestep) * steps and max(walked) < 0.1e-3
 
 
-@pytest.mark.parametrize("gait", TASKS)
+SLOW = [pytest.param(gait, marks=pytest.mark.long) for gait in TASKS if gait != "walk"]
+
+
+@pytest.mark.parametrize("gait", ["walk", *SLOW])
 def test_mirrored_actions_end_in_the_mirror_image(envs, gait):
     """After 60 s, with a weaker left side, to a millionth of the distance."""
     env, policy = envs[gait], gait_policy(gait)
@@ -431,7 +434,7 @@ def test_mirrored_actions_end_in_the_mirror_image(envs, gait):
     assert np.abs(one[3:] - other[3:]).max() < 1e-6
 
 
-@pytest.mark.parametrize("gait", ["crawl", "walk"])
+@pytest.mark.parametrize("gait", ["walk", pytest.param("crawl", marks=pytest.mark.long)])
 def test_contacts_do_not_make_the_speed(envs, gait):
     """Contacts without a layer, at a fifth of the step, and a layer twice as thick: within 5 %."""
     distance = []

@@ -303,6 +303,7 @@ def test_dry_friction_against_a_spring():
         drag.drag(pull, 0.1, np.full(2, 25.0), mass=mass, friction=-0.1)
 
 
+@pytest.mark.long
 def test_a_tca_drags_until_its_pull_is_the_friction():
     """Slow heating is static; energy balances at any time; five with five times as much are one."""
     one, five = drag.study(190.0), drag.study(190.0, 5)
