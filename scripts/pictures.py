@@ -16,8 +16,8 @@ from tca_mj.envs.arm import ArmPickPlace
 from tca_mj.record.render import Offscreen, colour_tendons
 
 # Time after the start of each phase at which its picture is taken [s].
-MOMENTS = {"align": 1.0, "open": 3.0, "lower": 1.5, "pinch": 3.5, "lift": 1.5, "turn back": 6.0,
-           "bend": 5.5, "release": 1.8}  # fmt: skip
+MOMENTS = {"align": 1.0, "open": 3.0, "lower": 1.5, "pinch": 1.0, "lift": 1.5, "turn back": 6.0,
+           "bend": 5.5, "release": 1.0}  # fmt: skip
 HERO = ("bend", 5.5)
 
 
