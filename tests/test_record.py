@@ -466,12 +466,18 @@ def opengl() -> None:
         pytest.skip(str(error))
 
 
-@pytest.mark.usefixtures("opengl")
-def test_a_picture_shows_the_temperature(simulation: Chain) -> None:
-    simulation.reset()
+def looking() -> mujoco.MjvCamera:
+    """A camera that has the whole chain in its picture."""
     camera = mujoco.MjvCamera()
     camera.lookat[:] = [0.0, 0.0, 0.12]
     camera.distance, camera.azimuth, camera.elevation = 0.25, 90.0, -10.0
+    return camera
+
+
+@pytest.mark.usefixtures("opengl")
+def test_a_picture_shows_the_temperature(simulation: Chain) -> None:
+    simulation.reset()
+    camera = looking()
     pictures = []
     with render.Offscreen(simulation.model, width=320, height=240, camera=camera) as view:
         for temperature in (np.full(2, 25.0), np.full(2, 180.0)):
@@ -499,9 +505,7 @@ def test_a_coil_runs_round_its_path() -> None:
 @pytest.mark.usefixtures("opengl")
 def test_a_picture_has_coils_and_a_caption(simulation: Chain) -> None:
     simulation.reset()
-    camera = mujoco.MjvCamera()
-    camera.lookat[:] = [0.0, 0.0, 0.12]
-    camera.distance, camera.azimuth, camera.elevation = 0.25, 90.0, -10.0
+    camera = looking()
     with render.Offscreen(
         simulation.model, width=320, height=240, camera=camera, coils=simulation.tendon
     ) as view:
