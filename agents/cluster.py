@@ -10,10 +10,17 @@ import signal
 import sys
 import tempfile
 import threading
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
+
+from tca_mj.agents.workers import Found
+from tca_mj.checks import whole
+
+Failures = Annotated[int, partial(whole, at_least=0, at_most=100)]
+"""How often what a process or machine did that was lost is begun again."""
 
 _TRIES = 3  # to start; on a busy machine Ray gives up after half a minute
 _SHORT = 18  # length of a folder in which the paths of sockets are not too long for any system
@@ -49,6 +56,62 @@ def cluster(out: Path, workers: int, address: str | None) -> Iterator[None]:
             ends.callback(ray.shutdown)
             _start(told)
         yield
+
+
+class ClusterWorkers:
+    """Calls functions on the cores of a running cluster, as ``Workers`` does in processes.
+
+    What a machine was doing that is lost is done again by another one.
+    """
+
+    def __init__(self, out: Path, address: str, failures: Failures = 3) -> None:
+        """A cluster to be joined on entry.
+
+        Args:
+            out: What the work is for.
+            address: Of the cluster, as ``ray.init`` takes it.
+            failures: How often a call is made again whose process or machine was lost.
+        """
+        self._cluster = cluster(out, 1, address)
+        self._failures = failures
+
+    def __enter__(self) -> ClusterWorkers:
+        self._cluster.__enter__()
+        return self
+
+    def __exit__(self, *error: Any) -> None:
+        self._cluster.__exit__(*error)
+
+    def run(
+        self, function: Callable[..., Found], jobs: Sequence[tuple[Any, ...]]
+    ) -> Iterator[tuple[int, Found]]:
+        """Yields the number of each job and what came of it, in any order.
+
+        Args:
+            function: A function of a module; what it raises is raised here.
+            jobs: Its arguments, call by call.
+
+        Raises:
+            ChildProcessError: If a call was lost too often.
+        """
+        import ray
+        from ray.exceptions import RayError, RayTaskError
+
+        remote = ray.remote(num_cpus=1, max_retries=self._failures)(function)
+        pending = {remote.remote(*job): i for i, job in enumerate(jobs)}
+        try:
+            while pending:
+                for reference in ray.wait(list(pending))[0]:
+                    try:
+                        answer = ray.get(reference)
+                    except RayTaskError as error:
+                        raise error.cause from None
+                    except RayError as error:
+                        raise ChildProcessError(f"the cluster lost a call: {error}") from error
+                    yield pending.pop(reference), answer
+        finally:
+            for reference in pending:  # what nobody waits for any more
+                ray.cancel(reference, force=True)
 
 
 def _start(told: Mapping[str, Any]) -> None:

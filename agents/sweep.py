@@ -16,11 +16,11 @@ import os
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, fields, replace
-from functools import partial
+from importlib.util import find_spec
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
-from tca_mj.agents.cluster import cluster
+from tca_mj.agents.cluster import Failures, cluster
 from tca_mj.agents.evaluate import METRICS, Evaluation, cell, evaluate, label
 from tca_mj.agents.output import read_json, write_csv, write_json
 from tca_mj.agents.progress import progress_bar
@@ -32,12 +32,13 @@ from tca_mj.pages import table
 from tca_mj.registry import ALGORITHMS
 
 TRIALS, RESULT = "trials", "result.json"
-TABLE, PAGE, ABOUT = "results.csv", "results.md", "sweep.json"
+TABLE, PAGE, FIGURE, ABOUT = "results.csv", "results.md", "results.png", "sweep.json"
 
 Value = float | int | str
+# What is drawn, the first three of these that there are.
+_DRAWN = ("speed", "success", "duration", "energy_per_metre", "energy", "return")
 MOST_TRIALS = 10_000
 """Most combinations of a sweep, each of which has a folder and takes seconds at least."""
-_Failures = Annotated[int, partial(whole, at_least=0, at_most=100)]
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -46,9 +47,10 @@ class Sweep(Checked):
 
     Attributes:
         evaluation: What is measured at each setting, where an axis says nothing else.
-        axes: Values by name; all combinations are run. Names are fields of ``Evaluation``,
-            ``design.PATH`` for a figure of the robot (see ``tca_mj.agents.design.robot_of``), and
-            with an algorithm ``train.FIELD`` or ``train.learner.FIELD`` of the training's settings.
+        axes: Values by name; all combinations are run. Names are fields of ``Evaluation`` (its task
+            too), ``design.PATH`` for a figure of the robot (see ``tca_mj.agents.design.robot_of``),
+            and with an algorithm ``train.FIELD`` or ``train.learner.FIELD`` of the training's
+            settings.
         algorithm: Whether a policy is trained first, and how: one of
             ``tca_mj.registry.ALGORITHMS``. What is evaluated is then the best policy of the
             run. Training is on the default robot.
@@ -102,7 +104,7 @@ class Trial:
     def evaluation(self, folder: Path) -> Evaluation:
         """What is measured; the policy is that of the run in ``folder`` if one is trained."""
         known = {entry.name for entry in fields(Evaluation)} - {
-            "task", "design", "arguments", "preprocessing", "options",
+            "design", "arguments", "preprocessing", "options",
         }  # fmt: skip
         design = dict(self.sweep.evaluation.design)
         change: dict[str, Any] = {}
@@ -123,8 +125,7 @@ class Trial:
 
     def config(self) -> Any:
         """Settings of the training, or None."""
-        self.evaluation(Path())
-        task, algorithm = self.sweep.evaluation.task, self.sweep.algorithm
+        task, algorithm = self.evaluation(Path()).task, self.sweep.algorithm
         if algorithm is None:
             return None
         given = [name for name in self.point if name.startswith("train.")]
@@ -164,12 +165,13 @@ class Trial:
 @door
 def run_sweep(
     sweep: Sweep, out: Path, *, workers: Processes = 2, address: str | None = None,
-    failures: _Failures = 3,
+    failures: Failures = 3,
 ) -> list[dict[str, Any]]:
     """Runs what is missing of the trials and writes the table of all.
 
-    Into ``out`` go ``trials/NAME/``, ``sweep.json`` (axes, versions, machine), ``results.csv`` and
-    ``results.md``. Trials that ended in an error are left out of the table and named.
+    Into ``out`` go ``trials/NAME/``, ``sweep.json`` (axes, versions, machine), ``results.csv``,
+    ``results.md``, and where Matplotlib is installed ``results.png``. Trials that ended in an
+    error are left out of the table and named.
 
     Args:
         sweep: What is swept.
@@ -298,3 +300,35 @@ def _write(sweep: Sweep, found: Sequence[dict[str, Any]], out: Path) -> None:
     write_csv(out / TABLE, data, columns)
     page = table([*sweep.axes, *map(label, names)], lines)
     write_whole(out / PAGE, ("\n".join(page) + "\n").encode())
+    _draw(sweep, found, names, out / FIGURE)
+
+
+def _draw(
+    sweep: Sweep, found: Sequence[dict[str, Any]], names: Sequence[str], path: Path
+) -> None:
+    """Means and intervals, a row for each combination; no figure without Matplotlib."""
+    shown = [name for name in _DRAWN if name in names][:3]
+    if not shown or not find_spec("matplotlib"):
+        return
+    from tca_mj.validation.figures import draw
+
+    varied = [name for name, values in sweep.axes.items() if len(values) > 1]
+    rows = [", ".join(f"{name} {row['point'][name]}" for name in varied) for row in found]
+    colours = {value: f"C{i % 10}" for i, value in enumerate(sweep.axes[varied[0]])} \
+        if varied else {}  # fmt: skip
+
+    def fill(figure: Any) -> None:
+        for axis, name in zip(figure.subplots(1, len(shown), squeeze=False)[0], shown, strict=True):
+            unit = METRICS[name][1]
+            for i, row in enumerate(found):
+                known = row["figures"].get(name, {})
+                colour = colours.get(row["point"].get(varied[0])) if varied else "C0"
+                ends = [known.get(end) for end in ("low", "high")]
+                if None not in ends:
+                    axis.plot([unit * end for end in ends], [i, i], color=colour, alpha=0.5)
+                if known.get("mean") is not None:
+                    axis.plot(unit * known["mean"], i, "o", color=colour)
+            axis.set(xlabel=label(name), ylim=(len(found) - 0.5, -0.5))
+            axis.set_yticks(range(len(found)), rows if name == shown[0] else [""] * len(found))
+
+    draw(path, 3.2 * len(shown) + 3.0, min(40.0, 1.2 + 0.24 * len(found)), fill)

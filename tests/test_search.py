@@ -315,11 +315,11 @@ def test_the_command_teaches_and_refuses(tmp_path, capsys):
 def test_the_command_runs_one_search_for_each_seed(monkeypatch, tmp_path):
     asked = []
 
-    def called(config, out, *, workers, command):
-        asked.append((config.seed, config.steps, out.name, workers, command))
+    def called(config, out, *, workers, command, address):
+        asked.append((config.seed, config.steps, out.name, workers, command, address))
 
     monkeypatch.setattr(searching, "search", called)
     arguments = ["train", "TCA/TetrapodWalk-v0", "--algo", "cma", "--seeds", "2", "--steps", "9"]
     assert main([*arguments, "--out", str(tmp_path), "--workers", "3"]) == 0
     command = "tca-mj train TCA/TetrapodWalk-v0 --algo cma --steps 9 --seeds 2"
-    assert asked == [(seed, 9, f"seed_{seed}", 3, command) for seed in (0, 1)]
+    assert asked == [(seed, 9, f"seed_{seed}", 3, command, None) for seed in (0, 1)]

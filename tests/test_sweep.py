@@ -88,6 +88,21 @@ def test_every_combination_is_run_and_tabled(tmp_path, monkeypatch):
     assert ran == [{"design.length": 0.06, "policy": "off"}]
 
 
+def test_several_tasks_are_an_axis(tmp_path, monkeypatch, capsys):
+    pytest.importorskip("matplotlib")
+    monkeypatch.setattr(module, "_tune", one_by_one)
+    command = ["sweep", "off", "--task", REACH, "--task", WALK, "--episodes", "2"]
+    assert cli.main([*command, "--set", "steps=2", "--out", str(tmp_path)]) == 0
+    with (tmp_path / "results.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert [row["task"] for row in rows] == [REACH, WALK]
+    assert [bool(row["speed"]) for row in rows] == [False, True]  # a module gets nowhere
+    assert (tmp_path / "results.png").stat().st_size > 10_000
+    assert "results.png" in capsys.readouterr().out
+    trained = Sweep(evaluation=SHORT, algorithm="sac", axes={"task": (REACH, WALK)})
+    assert [trial.config().task for trial in trained.trials()] == [REACH, WALK]
+
+
 def test_trials_that_fail_are_named_and_the_others_tabled(tmp_path, monkeypatch):
     def half(trials, out, *more):
         one_by_one(trials[:1], out, *more)
@@ -235,7 +250,7 @@ def test_a_trial_whose_process_is_lost_goes_on(tmp_path, monkeypatch):
     left = set(descendants()) - before
     assert not [name for name in map(descendants().get, left) if name and "ray" in name]
     names = sorted(path.name for path in (tmp_path / "out").iterdir())
-    assert names == ["ray", "results.csv", "results.md", "sweep.json", "trials"]
+    assert names == ["ray", "results.csv", "results.md", "results.png", "sweep.json", "trials"]
     assert not (tmp_path / "home").exists()
     with clusters._temporary(tmp_path / "out") as own:
         assert [own] == list(own.parent.glob(f"{own.name[:-8]}*"))

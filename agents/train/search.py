@@ -1,4 +1,4 @@
-"""Black-box search for gaits: CMA-ES over the figures of a gait, in several processes.
+"""Black-box search for gaits: CMA-ES over the figures of a gait, in processes or on a cluster.
 
 In every generation the scripted gait walks the same episodes as the others, which are scored
 against it. Nothing depends on how many processes there are, on the order in which they finish, or
@@ -19,6 +19,7 @@ import numpy as np
 from cmaes import CMA
 from numpy.typing import NDArray
 
+from tca_mj.agents.cluster import ClusterWorkers
 from tca_mj.agents.output import write_csv
 from tca_mj.agents.policies import SavedPolicy
 from tca_mj.agents.policies.actors import TROT, first_gait
@@ -107,7 +108,7 @@ class SearchState:
 @door
 def search(
     config: SearchConfig, out: Path, *, workers: Processes = 2, command: str = "",
-    progress: bool = True,
+    progress: bool = True, address: str | None = None,
 ) -> SavedPolicy:
     """Searches for a gait, or goes on with the search that ``out`` holds.
 
@@ -121,11 +122,15 @@ def search(
         workers: Processes that run episodes; no result depends on it.
         command: What to note as the command.
         progress: Whether to show how far it is.
+        address: Of a running Ray cluster, whose cores run the episodes instead of ``workers``, as
+            ``ray.init`` takes it.
 
     Returns:
         The best gait.
 
     Raises:
+        ImportError, ConnectionError: If Ray is not installed, or there is no cluster at
+            ``address``.
         FileNotFoundError, ValueError: If the settings do not fit, or not to the run in ``out``.
         BlockingIOError: If another process works in ``out``.
         OSError: If something cannot be written.
@@ -147,7 +152,8 @@ def search(
         ends.callback(bar.close)
         run = _Search(config, folder, space, point, state, known, board)
         ends.callback(run.save)
-        run.processes = ends.enter_context(Workers(workers))
+        where = Workers(workers) if address is None else ClusterWorkers(out, address)
+        run.processes = ends.enter_context(where)
         run.prepare()
         while run.state.steps < config.steps:
             run.generation()
@@ -181,7 +187,7 @@ class _Search:
     state: SearchState
     known: dict[tuple[str, int], Headway]
     board: Any
-    processes: Workers = field(init=False)
+    processes: Workers | ClusterWorkers = field(init=False)
 
     def __post_init__(self) -> None:
         self._scripted = first_gait(self.config.task, "scripted")

@@ -59,6 +59,8 @@ def add_commands(commands: Commands) -> None:
     add(some, "--seeds", "runs with seeds 0 to K-1, into OUT/seed_0, ...", metavar="K")
     add(train, "--out", "folder; default runs/train/TASK-ALGO")
     add(train, "--workers", "processes of cma; default 2", default=2)
+    add(train, "--address", "of a running Ray cluster whose cores run cma's episodes; default:"
+        " --workers processes")  # fmt: skip
     add(train, "--envs", "environments at a time; not of cma")
     add(train, "--residual", "correct a gait by at most K kelvin", type=parse_number, metavar="K")
     add(train, "--video", "film the best network at the end; --no-video leaves that for later",
@@ -70,7 +72,8 @@ def add_commands(commands: Commands) -> None:
         commands, "sweep", _sweep, help="evaluate or train at many settings", extra="sweep"
     )
     add(sweep, "policy", "who acts; not with --algo", nargs="?", metavar="POLICY")
-    add(sweep, "--task", "its id", required=True)
+    add(sweep, "--task", "its id; may be given several times", action="append", required=True,
+        dest="tasks")  # fmt: skip
     add(sweep, "--algo", "train this way, then evaluate", choices=ALGORITHMS)
     add(sweep, "--set", "values of a setting; may be given several times", action="append",
         default=[], type=parse_axis, metavar="NAME=VALUE,...", dest="axes")  # fmt: skip
@@ -129,8 +132,8 @@ def _train(arguments: argparse.Namespace) -> int:
              a learner that has any; with --residual K a policy corrects that gait's temperatures
              by at most K kelvin.
       cma    searches the figures of a gait on four legs (CMA-ES), from the scripted one, in about
-             10 minutes on two cores. Episodes run in --workers processes, on whose number nothing
-             depends.
+             10 minutes on two cores. Episodes run in --workers processes or on a cluster, on whose
+             number nothing depends.
 
     The folder holds
       run.json        settings, command, versions, machine
@@ -162,6 +165,8 @@ def _train(arguments: argparse.Namespace) -> int:
     asked = {name: getattr(arguments, name) for name in how if getattr(arguments, name) is not None}
     if cma and asked:
         raise ValueError("--action, --control-period and --tca are not for --algo cma")
+    if arguments.address is not None and not cma:
+        raise ValueError("--address is for --algo cma; many trainings at once are a sweep's")
     for seed in several or [arguments.seed]:
         out = base / f"seed_{seed}" if several else base
         arguments.kept[:] = [f"the same command goes on with {out}"]
@@ -172,7 +177,9 @@ def _train(arguments: argparse.Namespace) -> int:
         if cma:
             config = searching.SearchConfig(task=arguments.task, **given)
             config = replace(config, options={**config.options, **dict(arguments.options)})
-            searching.search(config, out, workers=arguments.workers, command=command)
+            searching.search(
+                config, out, workers=arguments.workers, command=command, address=arguments.address
+            )
         else:
             given |= {"arguments": asked, "options": dict(arguments.options)}
             settings = default_config(arguments.task, algorithm, **given)
@@ -208,6 +215,7 @@ def _sweep(arguments: argparse.Namespace) -> int:
     of the values that --set names, side by side by Ray Tune, and writes into the folder --out:
       results.csv   one row for each combination: means and 95 % intervals, in SI units
       results.md    the same as text
+      results.png   the same as a figure, where Matplotlib is installed
       trials/       the folder of each, in which it goes on where it stopped
 
     A trial whose process or machine is lost is begun again and goes on; so does the whole sweep
@@ -230,7 +238,7 @@ def _sweep(arguments: argparse.Namespace) -> int:
     """
     from tca_mj.agents.evaluate import Evaluation
     from tca_mj.agents.policies import Preprocessing
-    from tca_mj.agents.sweep import PAGE, TABLE, Sweep, run_sweep
+    from tca_mj.agents.sweep import FIGURE, PAGE, TABLE, Sweep, run_sweep
 
     if (arguments.policy is None) == (arguments.algo is None):
         raise ValueError("give POLICY or --algo")
@@ -238,16 +246,18 @@ def _sweep(arguments: argparse.Namespace) -> int:
     if arguments.algo and how != {"arguments": {}, "preprocessing": Preprocessing()}:
         raise ValueError("how a model was trained is said of POLICY, not with --algo")
     evaluation = Evaluation(
-        task=arguments.task, policy=arguments.policy or "off", episodes=arguments.episodes,
+        task=arguments.tasks[0], policy=arguments.policy or "off", episodes=arguments.episodes,
         **how,
     )  # fmt: skip
+    axes = ({"task": arguments.tasks} if arguments.tasks[1:] else {}) | dict(arguments.axes)
     arguments.kept.append(f"the same command goes on with {arguments.out}")
-    sweep = Sweep(evaluation=evaluation, axes=dict(arguments.axes), algorithm=arguments.algo)
+    sweep = Sweep(evaluation=evaluation, axes=axes, algorithm=arguments.algo)
     try:
         run_sweep(sweep, arguments.out, workers=arguments.workers, address=arguments.address)
     except RuntimeError as error:
         print(f"tca-mj sweep: {error}", file=sys.stderr)
         return 1
     print((arguments.out / PAGE).read_text(encoding="utf-8"))
-    print(f"{arguments.out / TABLE}\n{arguments.out / PAGE}")
+    written = (arguments.out / name for name in (TABLE, PAGE, FIGURE))
+    print("\n".join(str(file) for file in written if file.is_file()))
     return 0
