@@ -6,8 +6,9 @@
     python scripts/results_page.py --factors                  single factors of gaits, too: an hour
 
 Finished episodes are kept in runs/results; a second run goes on where the first one stopped.
-``docs/results.json`` holds the figures of the page, which tests compare with. Learning curves are
-those that come with the policies, ``agents/policies/NAME.csv``.
+``docs/results.json`` holds the figures of the page, which tests compare with; where episodes are
+not kept any more, a figure of the same settings, policy and versions is taken from it. Learning
+curves are those that come with the policies, ``agents/policies/NAME.csv``.
 """
 
 import argparse
@@ -58,18 +59,22 @@ SHOWN = {
              "peak_temperature", "peak_tension", "return"),
     "goal": ("success", "duration", "energy", "peak_temperature", "peak_tension", "return"),
 }  # fmt: skip
-# What is drawn of a learning curve, the first of these that it has: columns, what they are, and by
-# what factor.
+# What is drawn of a learning curve, the first of these that it has: column, what it is, by what
+# factor, and on which robots the levels are that stand beside it.
 CURVES = (
-    (("speed_mean_m_per_s", "validation_speed_m_per_s"), "speed [mm/s]", 1e3),
-    (("speed",), "speed in the run's evaluations [mm/s]", 1e3),
-    (("return_mean",), "return", 1.0),
+    ("top_speed", "speed [mm/s]", 1.0, "nominal"),
+    ("speed", "speed [mm/s]", 1e3, "± 20 %"),
+    ("return_mean", "return", 1.0, ""),
 )
 
 
 CURVE_NOTE = """\
-Of gaits: the mean speed of a generation, on one robot that is drawn for it, so that it goes up and
-down; and that of the search's middle on the eight robots of the validation, always the same."""
+Of searched gaits: how much faster than the script's, on the same robot, the best gait of each
+generation was, times the script's speed on the nominal one; robots differ from generation to
+generation. Of networks that walk: the speed in the run's evaluations, on five robots that are off
+by 20 %, of `tetrapod-command` on commands that are drawn, slow and sideways ones among them.
+Dashed, the script and what came of it, straight ahead: on the nominal robot beside a search, on
+five robots of the table above beside a network."""
 
 INTRODUCTION = """\
 # Results
@@ -153,7 +158,7 @@ def factors(found: dict[str, dict[str, Any]]) -> list[str]:
     return [*lines, ""]
 
 
-def curves() -> list[str]:
+def curves(results: dict[str, dict[str, dict[str, Any]]]) -> list[str]:
     """Draws the learning curves that come with the policies; returns the lines that show them."""
     lines = []
     for name, path in shipped().items():
@@ -162,29 +167,35 @@ def curves() -> list[str]:
             continue
         with file.open(encoding="utf-8", newline="") as text:
             rows = list(csv.DictReader(text))
-        keys, what, factor = next(each for each in CURVES if each[0][0] in rows[0])
-        columns = {
-            key: [(float(row["steps"]), factor * float(row[key])) for row in rows if row.get(key)]
-            for key in keys
+        found = results.get(SavedPolicy.read(path).task, {})
+        key, what, factor, condition = next(each for each in CURVES if each[0] in rows[0])
+        levels = {
+            agent: METRICS["speed"][1] * found[agent][condition]["figures"]["speed"]["mean"]
+            for agent in ("scripted", name)
+            if condition and condition in found.get(agent, {})
         }
+        if key == "top_speed":  # in units of the script's
+            factor = levels["scripted"]
+        points = [(float(row["steps"]), factor * float(row[key])) for row in rows if row.get(key)]
         picture = PICTURES / f"curve_{name}.png"
-        draw(picture, columns, name, what)
+        draw(picture, points, levels, name, what)
         lines += [f"![{name}: {what} over steps of the task](pictures/{picture.name})", ""]
     return lines
 
 
 def draw(
-    path: Path, columns: dict[str, list[tuple[float, float]]], title: str, what: str
+    path: Path, points: list[tuple[float, float]], levels: dict[str, float], title: str, what: str
 ) -> None:
-    """One learning curve."""
+    """One learning curve, with levels as lines."""
     import matplotlib.pyplot as plt
 
-    figure, axes = plt.subplots(figsize=(6.0, 2.6), layout="constrained")
-    for name, points in columns.items():
-        if points:
-            label = name.removesuffix("_m_per_s").replace("_", " ")
-            axes.plot(*zip(*points, strict=True), marker=".", label=label)
-    axes.legend(frameon=False)
+    figure, axes = plt.subplots(figsize=(6.0, 2.8), layout="constrained")
+    axes.plot(*zip(*points, strict=True), marker=".")
+    for k, (agent, level) in enumerate(levels.items()):
+        axes.axhline(level, color=f"C{k + 1}", linestyle="--", label=f"{agent}, {level:.2g}")
+    if levels:
+        axes.legend(frameon=False)
+        axes.set_ylim(bottom=0.0)
     axes.set(xlabel="steps of the task", ylabel=what, title=title)
     axes.grid(alpha=0.3)
     figure.savefig(path, dpi=110)
@@ -196,7 +207,7 @@ def page(results: dict[str, dict[str, dict[str, Any]]]) -> str:
     lines = [INTRODUCTION]
     for task, found in results.items():
         lines += [f"## `{task}`", "", *table(task, found), "", *factors(found)]
-    drawn = curves()
+    drawn = curves(results)
     if drawn:
         lines += ["## Learning curves", "", CURVE_NOTE, "", *drawn]
     return "\n".join(lines)
@@ -211,18 +222,24 @@ def main(argv: list[str] | None = None) -> None:
     parser.add_argument("--factors", action="store_true", help="single factors of gaits, too")
     parser.add_argument("--out", type=Path, default=ROOT / "runs" / "results")
     arguments = parser.parse_args(argv)
+    before = json.loads(DATA.read_text(encoding="utf-8")) if DATA.is_file() else {}
     results: dict[str, dict[str, dict[str, Any]]] = {}
     for task, policy, condition, evaluation in cases(known):
         folder = arguments.out / task.partition("/")[2] / policy
         wanted = arguments.factors or condition not in FACTORS
-        if task in arguments.tasks and wanted and not arguments.page:
+        key = evaluation.key()
+        entry = before.get(task, {}).get(policy, {}).get(condition, {})
+        known = entry.get("key") == key and entry["episodes"] == evaluation.episodes
+        if task in arguments.tasks and wanted and not arguments.page and not known:
             print(f"{task}: {policy}, {condition}", flush=True)
             evaluate(evaluation, out=folder, workers=arguments.workers)
-        rows = kept(folder / EPISODES, evaluation.key())
-        if len(rows) < evaluation.episodes:
+        rows = kept(folder / EPISODES, key)
+        if len(rows) >= evaluation.episodes:
+            seeds = range(evaluation.seed, evaluation.seed + evaluation.episodes)
+            figured = figures([rows[seed] for seed in seeds])
+            entry = {"key": key, "episodes": evaluation.episodes, "figures": figured}
+        elif not known:
             continue  # not run yet
-        seeds = range(evaluation.seed, evaluation.seed + evaluation.episodes)
-        entry = {"episodes": evaluation.episodes, "figures": figures([rows[s] for s in seeds])}
         results.setdefault(task, {}).setdefault(policy, {})[condition] = entry
     DATA.write_text(json.dumps(results, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
     PAGE.write_text(page(results), encoding="utf-8")
