@@ -10,6 +10,9 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
+from tca_mj.certify.cases import Case, at_rest, gap, theory
+from tca_mj.certify.rest import Load
+from tca_mj.certify.subjects import SUBJECTS, read
 from tca_mj.modules.bistable import BistableSpec, bistable_module, shaped
 from tca_mj.sim import Simulation
 from tca_mj.tca import law_at
@@ -128,6 +131,37 @@ def test_the_module_rests_where_theory_says(temperature, force):
     assert sim.tension[1] > 0.05 or temperature < 100.0
 
 
+@pytest.mark.parametrize(
+    ("name", "hot"), [("bistable-1", [80.0, 25.0]), ("bistable-2", [80.0, 110.0])]
+)
+def test_theory_with_stretch_and_the_elastica_agree(name, hot):
+    """The body of any strain with a spring, by least energy, and the plane sum of polynomials."""
+    subject = SUBJECTS[name]()
+    still = np.zeros((1, 3))
+    load = Load(force=still + [0.01, 0.0, 0.0], moment=still, gravity=np.zeros(3))
+    case = Case(temperature=np.array(hot), posture="hanging", load=load)
+    found = theory(subject, case)
+    ((_, _, x), _, (_, _, z)) = found.rotation[0]
+    bend = float(np.arctan2(x, z))
+    rod = replace(SPEC.rod, force=(0.01, 0.0))
+    assert (bend < -0.5) == (name == "bistable-1")
+    assert found.position[0, [0, 2]] == pytest.approx(rod.tip(bend), abs=1e-5)
+    moment = 2.0 * SPEC.offset * float(found.tension @ [-1.0, 1.0])
+    assert rod.moment(bend) == pytest.approx(moment, abs=0.01 * abs(moment) + 5e-6)
+    apart = gap(subject, at_rest(subject, case, near="energy"), found)
+    assert 1e-6 < apart.position < 0.01
+
+
+def test_a_band_that_is_not_as_built_is_seen():
+    """The model's band is what theory gets of it; its elastica knows the specification's."""
+    part = bistable_module(SPEC)
+    part.spec.tendon("band").stiffness = [1.05 * SPEC.band, 0.0, 0.0]
+    (segment,) = read(part, what="").limbs([0.0, 0.0])[0].segments
+    (spring,) = segment.springs
+    assert spring.stiffness == pytest.approx(1.05 * SPEC.band)
+    assert spring.length == SPEC.band_length and spring.start == spring.end == (0.0, 0.0, 0.0)
+
+
 def triggers(spec, temperature):
     """Least moment of a U over what the module asks of it, on its way from state 2 to the top."""
     first, top, second = spec.rod.states()
@@ -146,6 +180,8 @@ def test_a_safe_tca_triggers_both_states():
     assert 1.1 < triggers(SPEC, 172.0) < 1.15
     assert triggers(replace(SPEC, window=0.6), 172.0) < 0.95
     assert SPEC.rod.thresholds(SPEC.offset).second < SPEC.rod.thresholds(SPEC.offset).first
+    # One that is weaker by a fifth does not open it below 180 °C, at which the tasks end.
+    assert 0.8 * triggers(SPEC, 180.0) < 0.96 < 0.86 * triggers(SPEC, 172.0)
 
 
 def test_slack_is_what_the_tca_is_longer_by():

@@ -275,6 +275,14 @@ def wired(part):
         tendon.wrap_site(f"{piece}.eye")
 
 
+def hooked(part):
+    """A spring that is fixed in the middle of a chain."""
+    tendon = part.spec.add_tendon(name="hook", stiffness=[5.0, 0, 0], springlength=[0.0, 1e-2])
+    for piece in ("body.piece0", "body.piece3"):
+        part.spec.body(piece).add_site(name=f"{piece}.eye")
+        tendon.wrap_site(f"{piece}.eye")
+
+
 def driven(part):
     part.spec.add_actuator(
         name="motor", trntype=mujoco.mjtTrn.mjTRN_JOINT, target="body.bend_x0"
@@ -317,6 +325,7 @@ def on_the_floor(part):
         (floating, "has the free joint 'root' in the body 'body.piece0', which is of no chain"),
         (looped, "has the equality 'pin' of the body 'body.piece8' and the body 'body.piece3'"),
         (wired, "has the tendon 'wire', which is no TCA's"),
+        (hooked, "has the spring 'hook', which is not from what stands still to the end of a"),
         (driven, "has the actuator 'motor' on the body 'body.piece1', which is no TCA's"),
         (limited, "limits or dry friction in the joint 'body.bend_x2' of the body 'body.piece3'"),
         (stiff, "has lost the joint 'body.twist4' of the body 'body.piece5'"),

@@ -1,14 +1,16 @@
 """Two solvers that share the energy of a section and no more find the same shapes."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from tca_mj.rod import BeamSpec, Segment, solve_series, solve_static
+from tca_mj.rod import BeamSpec, Segment, Spring, solve_series, solve_static
 from tca_mj.routes import Helix, UTurn, leg_length
 
 
-class Spring:
+class Cord:
     """Law of a strand that is slack below its rest length and stiffens above."""
 
     def __init__(self, rest, stiffness, hardening):
@@ -56,7 +58,7 @@ def random_segment(rng, level, first):
         tension = rng.uniform(0.1, 1.0) * level * min(beam.bending) / beam.length / lever
         rest = sum(leg_length(leg, beam.length, beam.curvature) for leg in route.legs)
         stiffness = tension / (0.15 * rest)
-        law = Spring(rest * rng.uniform(0.7, 1.1), stiffness, stiffness / rest * rng.choice([0, 1]))
+        law = Cord(rest * rng.uniform(0.7, 1.1), stiffness, stiffness / rest * rng.choice([0, 1]))
         tensions.append(law if rng.random() < 0.4 else tension)
     place = {}
     if not first or rng.random() < 0.3:
@@ -140,3 +142,44 @@ def test_large_loads(beam, routes, tensions, loads):
     shapes = [solve_static(beam, routes, tensions, solver=name, **loads)
               for name in ("shooting", "energy")]  # fmt: skip
     assert_same(shapes[:1], shapes[1:])
+
+
+@pytest.mark.parametrize(
+    ("spring", "loads"),
+    [
+        (Spring(stiffness=2.0, length=5e-3, start=(30e-3, 5e-3, 10e-3)), {}),
+        (Spring(stiffness=5.0, length=10e-3, start=(0.0, 0.0, 60e-3), end=(3e-3, 0.0, 1e-3)),
+         {"gravity": (0.0, 9.81, 0.0)}),
+        (Spring(stiffness=0.2, length=0.0, start=(-20e-3, 10e-3, 40e-3), end=(0.0, 4e-3, 0.0)),
+         {"tip_force": (1e-3, 0.0, 0.0)}),
+        (Spring(stiffness=100.0, length=70e-3), {"gravity": (9.81, 0.0, 0.0)}),  # slack
+    ],
+)  # fmt: skip
+def test_a_spring_is_the_force_with_which_it_pulls_in_the_end(spring, loads):
+    """One solver knows the spring, the other one only what it pulls with, as dead loads."""
+    segment = Segment(ROUND, [Helix(4e-3)], [0.02])
+    (found,) = solve_series([replace(segment, springs=(spring,))], solver="energy", **loads)
+    arm = found.rotation[-1] @ spring.end
+    force = spring.pull(found.tip + arm - spring.start)
+    dead = loads | {"tip_force": np.asarray(loads.get("tip_force", np.zeros(3))) + force}
+    other = solve_series([segment], tip_moment=np.cross(arm, force), **dead)
+    assert_same([found], other)
+    assert (np.linalg.norm(force) > 2e-3) == (spring.length < 50e-3)
+
+
+def test_a_body_sets_out_to_the_state_that_is_meant():
+    """A band pulls the ends of a straight rod together: it rests to either side, as a mirror."""
+    band = Spring(stiffness=10.0, length=20e-3)
+    bent = []
+    for side in (-1.0, 1.0):
+        segment = Segment(FLAT, [], [], springs=(band,), start=(20.0 * side, 0.0, 0.0))
+        (shape,) = solve_series([segment], solver="energy")
+        bent.append(shape.position)
+    assert bent[0][-1, 1] > 10e-3
+    assert bent[1] == pytest.approx(bent[0] * [1.0, -1.0, 1.0], abs=1e-9)
+    with pytest.raises(ValueError, match="solver must be 'energy' where segments have springs"):
+        solve_series([segment])
+    with pytest.raises(ValueError, match="solver must be 'energy' where segments have a start"):
+        solve_series([replace(segment, springs=())])
+    with pytest.raises(ValueError, match=r"springs of segments\[0\] must be none"):
+        solve_series([segment, segment], solver="energy")

@@ -83,6 +83,9 @@ def draw(subject: Subject, name: str, count: int, seed: int) -> list[Case]:
         if posture == "lying":
             gravity = np.array([np.cos(across), np.sin(across), 0.0])
             gravity = np.array([0.0, 1.0, 0.0]) if subject.mirrored else gravity
+            gravity = np.array([np.sign(np.cos(across)), 0.0, 0.0]) if subject.plane else gravity
+        if subject.plane:
+            force, moment = force * [1.0, 0.0, 1.0], moment * [0.0, 1.0, 0.0]
         sides = [np.ones(3), _MIRROR] if subject.mirrored else [np.ones(3)] * tips
         load = Load(
             force=np.array([side * force for side in sides]),
@@ -195,7 +198,8 @@ def _joints(subject: Subject, case: Case, times: int, solver: str) -> dict[str, 
 
 def as_run(subject: Subject, case: Case) -> tuple[Rest, float]:
     """What a user sees of the module: its simulation, and the velocity that is left in the end."""
-    return run(subject.build(1), subject.tips, case.temperature, case.load)
+    part, step = subject.build(1), subject.timestep
+    return run(part, subject.tips, case.temperature, case.load, timestep=step)
 
 
 def gap(subject: Subject, found: Rest, exact: Rest) -> Gap:
@@ -223,7 +227,10 @@ def bent(subject: Subject, found: Sequence[tuple[Limb, Sequence[RodShape]]]) -> 
     """
     angles = []
     for limb, bodies in found:
-        unloaded = [replace(each, tensions=[slack] * len(each.tensions)) for each in limb.segments]
+        unloaded = [
+            replace(each, tensions=[slack] * len(each.tensions), springs=(), start=None)
+            for each in limb.segments
+        ]
         starts = solve_series(unloaded, solver=subject.solver, points=len(bodies[0].arc_length))
         for tip in limb.tips:
             way = limb.way(tip)

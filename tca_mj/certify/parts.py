@@ -3,7 +3,8 @@
 A part remembers which beams its chains stand for, and where the TCAs run in them. Their stiffness,
 weight and routes are taken from there and not from the MuJoCo model, so that a model that is wrong
 is found to be so. What is rigid (where a chain stands, what is fixed to it and what that weighs)
-only the model knows.
+only the model knows, as it does of springs: tendons that only pull, straight from what stands still
+to the end of a chain.
 
 A chain is one body to theory, or several behind each other: it is cut where something rigid sits on
 one of its pieces, or another chain stands there.
@@ -22,13 +23,14 @@ from tca_mj.checks import Array
 from tca_mj.model.chain import Member
 from tca_mj.model.part import Part
 from tca_mj.model.tendon import RoutedTca
-from tca_mj.rod import BeamSpec, Segment, StrandLaw
+from tca_mj.rod import BeamSpec, Segment, Spring, StrandLaw
 from tca_mj.rod.lie import quaternion_matrix
 from tca_mj.routes import Helix
 from tca_mj.tca import TcaSpec
 
 _NOTHING = 1e-12  # mass that counts as none [kg]
 _WORLD = ("", 0)
+_SITE = int(mujoco.mjtWrap.mjWRAP_SITE)
 
 Place = tuple[str, int]
 """A section that something is rigid with: chain and piece; the world has none."""
@@ -96,18 +98,23 @@ class Seen:
         chains: Its chains, each after that which it stands on.
     """
 
-    def __init__(self, part: Part, beams: Mapping[str, BeamSpec] | None = None) -> None:
+    def __init__(
+        self, part: Part, beams: Mapping[str, BeamSpec] | None = None,
+        starts: Mapping[str, tuple[float, float, float]] | None = None,
+    ) -> None:  # fmt: skip
         """Reads the part.
 
         Args:
             part: The part, which stays as it is.
             beams: For chains that are not what they were built as, by name, what they are.
+            starts: Curvatures with which chains set out, by name, as in ``Segment``.
 
         Raises:
             Outside: If there is something that theory does not know; it names the part, what it is
                 and the body.
         """
         self._part, self._members, self._beams = part, part.members, beams or {}
+        self._starts = starts or {}
         model = part.spec.copy().compile()
         _require_known(part, model)
         self.chains = tuple(sorted(
@@ -116,6 +123,7 @@ class Seen:
         self._where = self._placed(model)
         self._require_bound(model)
         self._weights = self._weighed(model)
+        self._springs = self._sprung(model)
         self._bodies = self._cut(model)
 
     @property
@@ -123,6 +131,11 @@ class Seen:
         """Whether the bodies do not stand on each other in one row."""
         bases = [body.segment.base for body in self._bodies]
         return bases != list(range(-1, len(bases) - 1))
+
+    @property
+    def sprung(self) -> bool:
+        """Whether springs pull on the bodies."""
+        return bool(self._springs)
 
     def limb(self, laws: Sequence[StrandLaw], tips: Iterable[str] | None = None) -> Limb:
         """All bodies.
@@ -188,6 +201,35 @@ class Seen:
             found[place] = old + mass, sum_of + there
         return {place: (mass, moment / mass) for place, (mass, moment) in found.items()}
 
+    def _sprung(self, model: mujoco.MjModel) -> dict[Place, tuple[Spring, ...]]:
+        """The springs on the ends of chains."""
+        ends = {(member.name, member.nodes) for member in self.chains}
+        ends -= {self._where[model.body(member.body(0)).id].place for member in self.chains}
+        found: dict[Place, tuple[Spring, ...]] = {}
+        for number in range(model.ntendon):
+            name = model.tendon(number).name
+            if name in {tca.name for tca in self._part.tcas}:
+                continue
+            first = int(model.tendon_adr[number])
+            sites = [int(site) for site in model.wrap_objid[first : first + 2]]
+            held = [self._where[int(model.site_bodyid[site])] for site in sites]
+            if held[0].place != _WORLD:
+                sites, held = sites[::-1], held[::-1]
+            place = held[1].place
+            if held[0].place != _WORLD or place not in ends:
+                what = f"has the spring {name!r}, which is not from what stands still to the end"
+                raise Outside(self._part, f"{what} of a chain")
+            start, end = (
+                tuple((fixed.motion @ [*model.site_pos[site], 1.0])[:3].tolist())
+                for fixed, site in zip(held, sites, strict=True)
+            )
+            spring = Spring(
+                stiffness=float(model.tendon_stiffness[number]),
+                length=float(model.tendon_lengthspring[number, 1]), start=start, end=end,
+            )  # fmt: skip
+            found[place] = (*found.get(place, ()), spring)
+        return found
+
     def _cut(self, model: mujoco.MjModel) -> list[_Body]:
         bases = {each.name: self._where[model.body(each.body(0)).id] for each in self.chains}
         marked = {*self._weights, *(base.place for base in bases.values())}
@@ -226,6 +268,8 @@ class Seen:
             [route for _, route in routes], [0.0] * len(routes),
             strands=[i for i, _ in routes], base=base, rotation=motion[:3, :3],
             offset=motion[:3, 3], mass=weight, centre=centre,
+            springs=self._springs.get((member.name, end), ()),
+            start=self._starts.get(member.name),
         )  # fmt: skip
         return _Body(segment, tuple(i for i, _ in routes), member.name, (start, end))
 
@@ -263,8 +307,8 @@ def _require_known(part: Part, model: mujoco.MjModel) -> None:
         raise Outside(part, f"{what}, which closes a loop")
     names = {tca.name for tca in part.tcas}
     for number in range(model.ntendon):
-        if model.tendon(number).name not in names:
-            what = f"has the tendon {model.tendon(number).name!r}, which is no TCA's"
+        if model.tendon(number).name not in names and not _is_spring(model, number):
+            what = f"has the tendon {model.tendon(number).name!r}, which is no TCA's and no spring"
             raise Outside(part, what)
     for number in range(model.nu):
         if model.actuator(number).name not in names:
@@ -278,6 +322,16 @@ def _require_known(part: Part, model: mujoco.MjModel) -> None:
         body = model.body(int(model.jnt_bodyid[number])).name
         what = f"has limits or dry friction in the joint {model.joint(number).name!r}"
         raise Outside(part, f"{what} of the body {body!r}")
+
+
+def _is_spring(model: mujoco.MjModel, number: int) -> bool:
+    """Whether a tendon is straight and pulls in proportion to what it is too long, no more."""
+    first, count = int(model.tendon_adr[number]), int(model.tendon_num[number])
+    straight = count == 2 and (model.wrap_type[first : first + 2] == _SITE).all()
+    more = (model.tendon_stiffnesspoly[number], model.tendon_frictionloss[number])
+    proportional = not any(np.any(each) for each in more) and not model.tendon_limited[number]
+    pulls = model.tendon_stiffness[number] > 0.0 and model.tendon_lengthspring[number, 0] == 0.0
+    return bool(straight and proportional and pulls)
 
 
 def _first(tca: RoutedTca) -> str:

@@ -162,6 +162,8 @@ class _Body:
     ) -> None:
         _hold(part, tips, load)
         part.spec.option.timestep = _TIMESTEP
+        # Rest is the same by any integrator; the way there wants the one with implicit springs.
+        part.spec.option.integrator = mujoco.mjtIntegrator.mjINT_DISCRETE
         count_warnings()
         self._name = part.spec.modelname
         self.model: mujoco.MjModel = part.spec.compile()

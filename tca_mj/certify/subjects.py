@@ -17,6 +17,7 @@ from tca_mj.certify.solid import Solid, solid
 from tca_mj.model.chain import MOTIONS, Member
 from tca_mj.model.part import Part
 from tca_mj.modules.bending import BendingSpec, bending_module
+from tca_mj.modules.bistable import BistableSpec, bistable_module
 from tca_mj.modules.finger import FingerPairSpec, finger_pair
 from tca_mj.modules.innervated import InnervatedFingerSpec, innervated_finger
 from tca_mj.modules.morphing import MorphingSpec, morphing_module
@@ -58,9 +59,11 @@ class Subject:
         moment: Largest moment on a tip [N m].
         mirrored: Whether the loads on the second tip mirror those on the first, x to -x, and
             gravity keeps that mirror.
+        plane: Whether all loads lie in the plane of x and z, as the chain bends in no other one.
         down: Direction in which the module hangs, shape (3,).
         temperature: Coldest and hottest a TCA becomes [°C].
         solver: Which solver of the theory is asked first.
+        timestep: Of its simulation; None for the default one [s].
     """
 
     what: str
@@ -73,9 +76,11 @@ class Subject:
     force: float = 0.0
     moment: float = 0.0
     mirrored: bool = False
+    plane: bool = False
     down: tuple[float, float, float] = (0.0, 0.0, 1.0)
     temperature: tuple[float, float] = (25.0, 160.0)
     solver: str = "shooting"
+    timestep: float | None = None
 
     @property
     def reach(self) -> tuple[float, ...]:
@@ -101,6 +106,7 @@ def _finer(spec: Any, times: int) -> Any:
 
 def read(part: Part, *, what: str, build: Callable[[int], Part] | None = None,
          tips: Mapping[str, str] | None = None, beams: Mapping[str, BeamSpec] | None = None,
+         starts: Mapping[str, tuple[float, float, float]] | None = None,
          **more: Any) -> Subject:  # fmt: skip
     """A part as a subject, to theory what the part remembers of itself.
 
@@ -111,12 +117,13 @@ def read(part: Part, *, what: str, build: Callable[[int], Part] | None = None,
         tips: Sites at the ends of chains that are looked at, by the chains' names; None for all
             ends.
         beams: For chains that are not what they were built as, by name, what they are.
+        starts: Curvatures with which chains set out to theory, by name, as in ``Segment``.
         **more: Other fields of the subject.
 
     Raises:
         Outside: If theory does not cover it.
     """
-    seen = Seen(part, beams)
+    seen = Seen(part, beams, starts)
 
     def copied(times: int) -> Part:
         """The part with sites at the ends of its chains."""
@@ -133,7 +140,7 @@ def read(part: Part, *, what: str, build: Callable[[int], Part] | None = None,
         what=what, nodes=tuple(member.nodes for member in seen.chains), build=build or copied,
         tcas=tuple(tca.spec for tca in part.tcas), limbs=limbs,
         tips=tuple(tips.values()) if tips else tuple(_end(member) for member in seen.chains),
-        solver="energy" if seen.branches else "shooting", **more,
+        solver="energy" if seen.branches or seen.sprung else "shooting", **more,
     )  # fmt: skip
 
 
@@ -285,6 +292,20 @@ def _grid_member(spec: MorphingGridSpec, what: str, **more: Any) -> Subject:
     )  # fmt: skip
 
 
+def _bistable(spec: BistableSpec, state: int) -> Subject:
+    """The module in one of its states; to state 1 theory sets out from a spine curved that way."""
+
+    def build(times: int) -> Part:
+        return bistable_module(_finer(spec, times), collide=False)
+
+    side = (-1.0, 1.0)[state - 1]
+    return read(
+        build(1), what=f"bistable module in state {state}", build=build, tips={"body": "tip"},
+        beams={"body": spec.body}, starts={"body": (0.0, side * spec.body.curvature[1], 0.0)},
+        force=5e-2, moment=2e-4, plane=True, timestep=5e-4,
+    )  # fmt: skip
+
+
 _QUARTER, _HALF = 0.5 * math.pi, math.pi
 _ACROSS = 1.0  # direction of the bend of the module that bends to any side [rad]
 # Largest loads on morphing modules. Cold: 15 g at the end, Sun, Fig. 6.1. Hot they weigh as much as
@@ -301,6 +322,8 @@ SUBJECTS: Mapping[str, Callable[[], Subject]] = MappingProxyType({
     "innervated": lambda: _innervated(InnervatedFingerSpec()),
     "finger": lambda: _finger(FingerPairSpec()),
     "soft-finger": lambda: _soft_finger(SoftFingerSpec()),
+    "bistable-1": lambda: _bistable(BistableSpec(), 1),
+    "bistable-2": lambda: _bistable(BistableSpec(), 2),
     "adaptive-gripper": lambda: _adaptive(AdaptiveGripperSpec(), _HALF),
     "arm": lambda: _arm(ArmSpec()),
     "morphing": lambda: _morphing(

@@ -6,6 +6,7 @@ They need imageio and imageio-ffmpeg, which are loaded when the first one is beg
 from __future__ import annotations
 
 import importlib
+import math
 from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
@@ -61,7 +62,7 @@ class Film(Closing):
         self._writer: Any = None
         self._claim: Claim | None = None
         self._fps, self._rate = fps, fps / speed
-        self._pace = ""
+        self._pace, self._digits = "", 1 + max(0, math.ceil(-math.log10(speed)))
         if speed != 1.0:
             times, how = max(speed, 1.0 / speed), "fast" if speed > 1.0 else "slow"
             self._pace = f", {times:.3g} times as {how}"
@@ -98,7 +99,7 @@ class Film(Closing):
                 coils=self.simulation.tendon,
             )  # fmt: skip
         colour_tendons(model, self.simulation.tendon, self.simulation.temperature)
-        picture = self._view.draw(self.simulation.data, f"{time:.1f} s{self._pace}")
+        picture = self._view.draw(self.simulation.data, f"{time:.{self._digits}f} s{self._pace}")
         if self._writer is None:
             self._claim = Claim(self.path)
             self._writer = self._imageio.get_writer(

@@ -11,7 +11,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tca_mj.checks import Checked, NotNegative, number, within
+from tca_mj.checks import Array, Checked, NotNegative, Positive, Triple, number, within
 from tca_mj.rod.beam import BeamSpec
 from tca_mj.rod.errors import RodSolveError
 from tca_mj.rod.lie import matrix_quaternion
@@ -29,6 +29,32 @@ class StrandLaw(Protocol):
 
         The length is that of the whole route, all legs together.
         """
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Spring(Checked):
+    """A straight spring that cannot push, like a rubber band, from the world to a body's tip.
+
+    Attributes:
+        stiffness: Force over what it is longer than slack [N/m].
+        length: Length at which it is slack [m].
+        start: Where it is fixed in the world [m].
+        end: Where it is fixed in the tip's frame [m].
+
+    Raises:
+        ValueError: If a number is out of range.
+    """
+
+    stiffness: Positive
+    length: NotNegative
+    start: Triple = (0.0, 0.0, 0.0)
+    end: Triple = (0.0, 0.0, 0.0)
+
+    def pull(self, way: Array) -> Array:
+        """Force on its end, if that is so far from its start, shape (3,) each [N], [m]."""
+        long = float(np.linalg.norm(way))
+        more = max(0.0, long - self.length)
+        return -self.stiffness * more / long * way if more else np.zeros(3)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -49,6 +75,10 @@ class Segment(Checked):
             None if every route is a strand of its own.
         base: Number of the segment on whose tip it stands, -1 for the world; None for the segment
             before it, and the world for the first.
+        springs: Springs that pull on its tip.
+        start: Curvature, shape (3,) [1/m], with which the body sets out on the path of loads, to
+            come to its own one on the way: it tells which of several states is meant. None for its
+            own from the start.
 
     Raises:
         ValueError: If a shape is wrong, a number not finite, a tension or mass negative, the
@@ -66,6 +96,8 @@ class Segment(Checked):
     centre: ArrayLike = (0.0, 0.0, 0.0)
     strands: Sequence[Hashable] | None = None
     base: int | None = None
+    springs: tuple[Spring, ...] = ()
+    start: Triple | None = None
 
     def __post_init__(self) -> None:
         Checked.__post_init__(self)
@@ -110,7 +142,8 @@ class StaticProblem:
 
     Raises:
         ValueError: If there is no segment, a shape is wrong or a number not finite, a segment
-            stands on none before it, or a strand has two tensions.
+            stands on none before it, a strand has two tensions, or a spring pulls where another
+            segment stands.
     """
 
     segments: Sequence[Segment]
@@ -135,6 +168,10 @@ class StaticProblem:
                 raise ValueError(
                     f"base of segments[{i}] must be None, or a whole number from -1 to {i - 1},"
                     f" got {base!r}"
+                )
+            if base >= 0 and self.segments[base].springs:
+                raise ValueError(
+                    f"springs of segments[{base}] must be none where segments[{i}] stands on it"
                 )
         known: dict[Hashable, int] = {}
         tensions: list[float | StrandLaw] = []

@@ -80,7 +80,7 @@ def solve_series(
         gravity: Acceleration of gravity, world frame, shape (3,) [m/s²].
         solver: "shooting", on the balance of sections, or "energy", the minimum of the total
             energy over the motions of the sections. They share the section's energy, no more. A
-            tree is for "energy" alone.
+            tree, springs, and segments with a start are for "energy" alone.
         shearable: Whether sections shear. Without, the rod still stretches: what a chain of
             hinges and slides is.
         points: Number of points of each segment, at equal distances, 2 to 10 000. It has no
@@ -93,13 +93,18 @@ def solve_series(
 
     Raises:
         ValueError: If an argument has a wrong shape, is not finite, a tension is negative, or the
-            solver is not for a tree.
+            solver is not for what the segments are.
         RodSolveError: If no state is found, with what is left of the equations.
     """
     require_one_of("solver", solver, SOLVERS)
     problem = StaticProblem(segments, tip_force, tip_moment, gravity, shearable)
     if solver == "energy":
         return minimise(problem, points)
-    if problem.bases != tuple(range(-1, len(problem.segments) - 1)):
-        raise ValueError(f"solver must be 'energy' where segments branch, got {solver!r}")
+    for what, held in (
+        ("branch", problem.bases != tuple(range(-1, len(problem.segments) - 1))),
+        ("have springs", any(each.springs for each in problem.segments)),
+        ("have a start", any(each.start is not None for each in problem.segments)),
+    ):
+        if held:
+            raise ValueError(f"solver must be 'energy' where segments {what}, got {solver!r}")
     return solve(problem, points)

@@ -3,7 +3,8 @@
 With the strain xi = (u, v) of a body's centre line, g' = g xi^ for its frames, the energy is
 
     E = sum over segments of integral 1/2 (xi - xi*)^T K (xi - xi*) ds
-        + sum over strands of U_a(l_a) - f . p(tip) - gravity . (sum of mass times position),
+        + sum over strands of U_a(l_a) + sum over springs of 1/2 k (longer)²
+        - f . p(tip) - gravity . (sum of mass times position),
 
 U_a' = tension, with the length of a strand l_a = sum over its legs of the integral of |w| ds,
 w = v + u x r + r' at the offset r. A moment on the tip that is fixed in the world has no energy;
@@ -30,7 +31,7 @@ from tca_mj.quadrature import lagrange
 from tca_mj.rod.energy.mesh import POINTS, Mesh
 from tca_mj.rod.energy.motion import BASIS, Pieces, lump, rigid
 from tca_mj.rod.lie import hat, matrix_quaternion, quaternion_log
-from tca_mj.rod.problem import Segment, StaticProblem, asked
+from tca_mj.rod.problem import Segment, Spring, StaticProblem, asked
 from tca_mj.rod.sections import Sections, place
 from tca_mj.rod.shape import RodShape
 
@@ -49,6 +50,7 @@ class Line:
         joint: What is rigid before each, as factors of G, shape (k, 5, 5).
         end: What is rigid behind the last one, shape (5, 5).
         loaded: 1 if the load on the tip acts on its own, else 0.
+        springs: Those that pull on its tip.
     """
 
     segments: tuple[int, ...]
@@ -57,6 +59,7 @@ class Line:
     joint: Array
     end: Array
     loaded: float
+    springs: tuple[Spring, ...]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -69,7 +72,9 @@ class Course:
         after: What follows on the end of the pieces up to the tip, shape (k, 5, 5).
         tip: G at the tip.
         pull: Derivative of the loads' work by G at the tip, shape (5, 5).
-        work: Work of force and gravity.
+        work: Work of force and gravity, less the energy of springs.
+        stiff: For each spring where it is fixed on the tip, as G moves it, shape (5,), and by how
+            much its force falls with a motion of that point, shape (3, 3).
     """
 
     pieces: Pieces
@@ -78,6 +83,7 @@ class Course:
     tip: Array
     pull: Array
     work: float
+    stiff: tuple[tuple[Array, Array], ...]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -119,6 +125,7 @@ class Potential:
     Attributes:
         mesh: The mesh.
         unloaded: Strains without loads and tensions, shape (n, q, m).
+        start: Those with which the rods set out, the same shape.
         conservative: Whether there is an energy: no moment acts on the tip.
         metric: Twice the elastic energy of unit strains at each point, shape (n, q, m).
     """
@@ -142,6 +149,10 @@ class Potential:
         shape = len(owner), POINTS, 6
         self._stiffness = self._sections.stiffness.reshape(shape)[..., self._active]
         self.unloaded = self._sections.reference.reshape(shape)[..., self._active]
+        self.start = self.unloaded.copy()
+        for k, segment in enumerate(segments):
+            if segment.start is not None:
+                self.start[owner == k, :, :3] = self._size * np.asarray(segment.start)
         self._density = np.array([beam.line_density for beam in beams])[owner]
         self._density = self._density * self._size / self._force
         self.metric = self._weight[..., None] * self._stiffness
@@ -172,6 +183,7 @@ class Potential:
         return Line(
             segments=tuple(way), pieces=pieces, density=np.where(fresh, self._density[pieces], 0.0),
             joint=joint, end=end, loaded=float(tip == len(self._segments) - 1),
+            springs=self._segments[tip].springs,
         )  # fmt: skip
 
     def rough(self, strain: Array) -> NDArray[np.bool_]:
@@ -200,7 +212,7 @@ class Potential:
         drawn = np.moveaxis(drawn, -1, 0).reshape(count, *shape)
         bend = sections.hessian(density, tangent, np.append(tension, 0.0)[sections.strand])
         bend = bend[:, self._active][..., self._active].reshape(*shape, shape[-1])
-        excess = strain - self.unloaded
+        excess = strain - (factor * self.unloaded + (1.0 - factor) * self.start)
         stress = self._stiffness * excess
         return State(
             strain=strain, factor=factor, courses=courses,
@@ -231,8 +243,21 @@ class Potential:
         pull = load.copy()
         # A turn w of the tip changes R by w x R; the product with this is w . moment.
         pull[:3, :3] = 0.5 * line.loaded * hat(factor * self._moment) @ tip[:3, :3]
-        return Course(pieces=pieces, before=before, after=after, tip=tip, pull=pull,
-                      work=float(np.sum(load * tip)))  # fmt: skip
+        work, stiff = float(np.sum(load * tip)), []
+        for spring in line.springs:
+            at = np.array([*np.asarray(spring.end) / self._size, 1.0, 0.0])
+            way = tip[:3] @ at - np.asarray(spring.start) / self._size
+            long, rate = float(np.linalg.norm(way)), factor * spring.stiffness
+            rate *= self._size / self._force
+            more = long - spring.length / self._size
+            if more <= 0.0:
+                continue
+            work -= 0.5 * rate * more**2
+            pull[:3] -= rate * more / long * np.outer(way, at)
+            along = np.outer(way, way) / long**2
+            stiff.append((at, rate * (along + more / long * (np.eye(3) - along))))
+        return Course(pieces=pieces, before=before, after=after, tip=tip, pull=pull, work=work,
+                      stiff=tuple(stiff))  # fmt: skip
 
     def change(self, old: State, new: State) -> float:
         """Energy of a state minus that of another one nearby, with a moment's work on the way.
@@ -302,6 +327,9 @@ class Potential:
         within = within.swapaxes(2, 3).reshape(n, q * m, q * m)
         blocks, of = hessian.reshape(n, q * m, n, q * m), np.arange(n)
         blocks[of, :, of, :] -= within + np.swapaxes(within, 1, 2)
+        for at, stiffness in course.stiff:
+            moved = move[:, :3] @ (course.tip @ at)
+            hessian += moved @ stiffness @ moved.T
         return hessian, np.stack([move[:, 2, 1], move[:, 0, 2], move[:, 1, 0]], axis=-1)
 
     def distance(self, change: Array) -> float:
@@ -337,6 +365,11 @@ class Potential:
         gravity, last = np.asarray(problem.gravity), through[-1]
         force, moment = last[0].loaded * np.array([problem.tip_force, problem.tip_moment])
         moment = moment + np.cross(last[1].tip[:3, 3] * self._size, force)
+        for line, course in through:
+            for spring in line.springs:
+                there = course.tip[:3] @ [*spring.end, self._size, 0.0]
+                pulled = spring.pull(there - np.asarray(spring.start))
+                force, moment = force + pulled, moment + np.cross(there, pulled)
         return RodShape(
             position=self._size * frame[:, :3, 3], rotation=frame[:, :3, :3].copy(),
             arc_length=segment.beam.length * s, strain=strain,

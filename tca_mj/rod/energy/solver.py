@@ -81,7 +81,7 @@ def _followed(potential: Potential) -> State:
         step = min(_SMALLEST, left)
         return step, _rest(potential, state.strain, at + step, patient=True)
 
-    return load_up(potential.at(potential.unloaded, 0.0), solve, fall, _SMALLEST)
+    return load_up(potential.at(potential.start, 0.0), solve, fall, _SMALLEST)
 
 
 def _rest(potential: Potential, strain: Array, factor: float, *, patient: bool) -> State:
