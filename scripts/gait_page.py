@@ -125,16 +125,18 @@ def followed() -> list[str]:
                   "most off its heading [°]"], rows)  # fmt: skip
 
 
+def others(task: str, out: Path) -> dict[str, Any]:
+    """Figures of the script and of the searched gait that comes with the package."""
+    searched = f"tetrapod-{name_of(task).removeprefix('Tetrapod').lower()}"
+    assert searched in shipped()
+    return {name: measured(task, name, out / name) for name in ("scripted", searched)}
+
+
 def of_task(task: str, out: Path) -> dict[str, Any]:
     """Everything about a task, run as far as it is missing."""
-    short = name_of(task).removeprefix("Tetrapod").lower()
-    searched = f"tetrapod-{short}"
-    assert searched in shipped()
     return {
         "recipe": described(default_config(task, seed=0)).rpartition(", seed")[0],
-        "others": {
-            name: measured(task, name, out / name) for name in ("scripted", searched)
-        },
+        "others": others(task, out),
         "seeds": {str(seed): trained(task, seed, out) for seed in SEEDS},
     }  # fmt: skip
 
@@ -228,6 +230,7 @@ def main(argv: list[str] | None = None) -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--tasks", nargs="+", choices=GAITS, default=GAITS, metavar="TASK")
     parser.add_argument("--page", action="store_true", help="run nothing")
+    parser.add_argument("--others", action="store_true", help="but what was learned, as it is")
     parser.add_argument("--commands", action="store_true", help="how commands are followed, alone")
     parser.add_argument("--out", type=Path, default=ROOT / "runs" / "gaits")
     arguments = parser.parse_args(argv)
@@ -236,7 +239,9 @@ def main(argv: list[str] | None = None) -> None:
         return
     results = json.loads(DATA.read_text(encoding="utf-8")) if DATA.is_file() else {}
     for task in [] if arguments.page else arguments.tasks:
-        results[task] = of_task(task, arguments.out / name_of(task))
+        out = arguments.out / name_of(task)
+        again = {**results.get(task, {}), "others": others(task, out)}
+        results[task] = again if arguments.others else of_task(task, out)
         draw(task, results[task])
         DATA.write_text(json.dumps(results, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
     old = PAGE.read_text(encoding="utf-8") if PAGE.is_file() else ""

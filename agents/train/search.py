@@ -152,8 +152,10 @@ def search(
         ends.callback(bar.close)
         run = _Search(config, folder, space, point, state, known, board)
         ends.callback(run.save)
-        where = Workers(workers) if address is None else ClusterWorkers(out, address)
-        run.processes = ends.enter_context(where)
+        if address is None:
+            run.processes = ends.enter_context(Workers(workers))
+        else:
+            run.processes = ends.enter_context(ClusterWorkers(out, address))
         run.prepare()
         while run.state.steps < config.steps:
             run.generation()
