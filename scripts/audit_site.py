@@ -69,6 +69,7 @@ def main() -> int:
     grave, held, broken = 0, 0, 0
     for page, theme, found in look(pages, asked.axe.read_text(encoding="utf-8")):
         name = f"{page.relative_to(site)}, {theme}"
+        print(name, file=sys.stderr)  # how far it is
         if "error" in found:
             print(f"{name}: {found['error']}")
             grave += 1
