@@ -10,10 +10,10 @@ DEMO = runs/demo
 # Where PyTorch's CPU build is found: PyPI's, on Linux, brings 5 GB of CUDA.
 TORCH_INDEX ?= https://download.pytorch.org/whl/cpu
 
-.PHONY: help demo test bench docs lint clean
+.PHONY: help demo test bench docs lint release-check clean
 
 help:  ## this list
-	@sed -n 's/^\([a-z]*\):.*## */  make \1	/p' Makefile
+	@sed -n 's/^\([a-z-]*\):.*## */  make \1	/p' Makefile
 
 demo: $(INSTALLED)  ## the arm moves a screwdriver and a circuit board; recordings in runs/demo
 	$(BIN)/tca-mj demo pick-and-place --option object=screwdriver --out $(DEMO)/screwdriver
@@ -40,6 +40,9 @@ lint: $(INSTALLED)  ## style and types
 	$(BIN)/ruff check .
 	$(BIN)/python scripts/typing_tree.py
 	$(BIN)/mypy
+
+release-check: $(INSTALLED)  ## all that a release is tried with, some hours; its table is in docs/release.md
+	$(BIN)/python scripts/release_check.py
 
 clean:  ## removes .venv and what was built; keeps runs
 	rm -rf $(VENV) build dist *.egg-info .mypy_cache .pytest_cache .ruff_cache

@@ -35,6 +35,7 @@ HEARD = {
     '<div id="search-results">': '<h1>Search</h1>\n<div id="search-results">',
     '<div class="table-wrapper': '<div tabindex="0" class="table-wrapper',
     "<pre>": '<pre tabindex="0">',
+    '<th class="head"><p></p></th>': '<td class="head"></td>',
 }
 
 

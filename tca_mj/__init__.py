@@ -14,7 +14,7 @@ Attributes:
 
 from tca_mj.lazy import offer
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 try:
     from tca_mj import registry
