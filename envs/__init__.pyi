@@ -13,6 +13,7 @@ from tca_mj.envs.options import Constant, Option, Options, Uniform, variation_op
 from tca_mj.envs.outcome import Headway, TaskState, Verdict
 from tca_mj.envs.reach import BendReach, BendReachVector
 from tca_mj.envs.recipe import Recipe
+from tca_mj.envs.shapes import TetrapodShapes, TetrapodShapesVector
 from tca_mj.envs.table import Entry, Table
 from tca_mj.envs.task import HEATINGS, SimulatedTask, TaskArguments
 from tca_mj.envs.tetrapod import TetrapodGait, TetrapodGaitVector
@@ -28,6 +29,7 @@ __all__ = [
     "Option", "Options", "Places", "Recipe", "RecordRerun", "Retelling", "ScaledObservation",
     "SensedFinger", "SimulatedTask", "StaticTip", "Table", "TaskArguments", "TaskState",
     "TaskVector", "TetrapodCourse", "TetrapodCourseVector", "TetrapodGait", "TetrapodGaitVector",
-    "Uniform", "VectorScaledObservation", "Verdict", "ViewerEnvironment", "ViewerPolicy", "hang",
-    "hanging_module", "launch", "need_display", "register_task", "variation_options",
+    "TetrapodShapes", "TetrapodShapesVector", "Uniform", "VectorScaledObservation", "Verdict",
+    "ViewerEnvironment", "ViewerPolicy",
+    "hang", "hanging_module", "launch", "need_display", "register_task", "variation_options",
 ]  # fmt: skip

@@ -47,6 +47,9 @@ ACTION = Table(
     ]
 )
 
+# With a fan, which blows at all spines: that of the module, Sun, Section 6.1.3.
+FANNED = Table([*ACTION.entries, Entry("fan", 1, -1.0, 1.0, "on above 0", off=-1.0)])
+
 # The module's 6.5 mm (Sun, Section 6.1.1) read as its extent in the plane of bending, its 5 mm as
 # the width: with its TCA 4 mm from the axis the body can lift itself off the desk, with 2.5 mm, as
 # in ``SpineSpec()``, it stops at 33° to 57°. The section is as stiff as that one's. Estimate.
@@ -70,6 +73,8 @@ class Places(Checked):
         beam_end: End of the beam, over the second desk [m].
         target: Middle of the target [m].
         target_size: Half sizes of the target along x and y [m].
+        beam_top: Height of the beam over the first desk [m].
+        lower: Height of the second desk over the first [m].
         leg_station: Fore-aft distance of the legs' roots from the robot's middle [m].
     """
 
@@ -79,6 +84,8 @@ class Places(Checked):
     beam_end: float
     target: float
     target_size: tuple[float, float]
+    beam_top: float
+    lower: float
     leg_station: float
 
 
@@ -118,6 +125,7 @@ class TetrapodCourse(SimulatedTask):
             the rear.
         12-14: the same of the spines' TCAs; see ``SimulatedTask``.
         15-17: voltage of the spines' heaters.
+        18: with ``fan``, whether a fan blows at the spines, above 0.
 
     Observation, shape (62,): see ``OBSERVATION``. The body angle is the bend from rail to rail;
     position and velocity are those of the middle of the spines.
@@ -154,6 +162,7 @@ class TetrapodCourse(SimulatedTask):
         self,
         *,
         robot: TetrapodSpec | None = None,
+        fan: bool = False,
         timestep: Timestep = 5e-3,
         tca_period: Timestep = 2.5e-2,
         **common: Unpack[TaskArguments],
@@ -162,6 +171,8 @@ class TetrapodCourse(SimulatedTask):
 
         Args:
             robot: The robot, by default one with ``LIFTING_SPINE``.
+            fan: Whether there is a fan, of 1 m/s, that can blow at the spines; its energy is not
+                counted.
             timestep: Physics time step [s].
             tca_period: Time between two updates of the TCAs, a multiple of ``timestep`` [s].
             **common: See ``TaskArguments``.
@@ -175,7 +186,8 @@ class TetrapodCourse(SimulatedTask):
             mjcf("course.xml"), {}, self.robot, timestep=timestep, period=tca_period
         )
         seen = OBSERVATION.covering({"TCA length": (0.0, float(sim.bank.longest.max()))})
-        self._open(sim, seen, ACTION, _OPTIONS, **common)
+        self.fan = fan
+        self._open(sim, seen, FANNED if fan else ACTION, _OPTIONS, **common)
         self.stance = Stance(sim, self.robot)
         self._find(self.model)
         self.touched = False
@@ -190,6 +202,10 @@ class TetrapodCourse(SimulatedTask):
             geom = model.geom(name)
             return float(geom.pos[0] + sign * geom.size[0])
 
+        def top(name: str) -> float:
+            geom = model.geom(name)
+            return float(geom.pos[2] + geom.size[2])
+
         target = model.geom("target")
         self.places = Places(
             stand=end("glass", 1.0) + self.robot.rail_length / 2.0 + 0.025,
@@ -198,6 +214,8 @@ class TetrapodCourse(SimulatedTask):
             beam_end=end("beam", 1.0),
             target=float(target.pos[0]),
             target_size=(float(target.size[0]), float(target.size[1])),
+            beam_top=top("beam"),
+            lower=top("desk2"),
             leg_station=self.robot.leg_station,
         )
 
@@ -223,9 +241,10 @@ class TetrapodCourse(SimulatedTask):
         self._x = float(self.position[0])
 
     def drive(self, command: NDArray[np.float64]) -> Drive:
-        """What the TCAs are told, and voltage of the heaters; see the class."""
-        voltage = self.max_voltage * ((command[TCAS:] + 1.0) / 2.0)
-        return Drive(command=self.heated(command[:TCAS]), voltage=voltage)
+        """What the TCAs are told, voltage of the heaters, and the fan; see the class."""
+        voltage = self.max_voltage * ((command[TCAS : TCAS + SPINES] + 1.0) / 2.0)
+        blows = self.fan and bool(command[-1] > 0.0)
+        return Drive(command=self.heated(command[:TCAS]), voltage=voltage, fan=blows)
 
     def judge(self, drive: Drive, harmed: bool) -> Verdict:
         """Headway, what was touched and damaged, and whether the robot lies on the target."""

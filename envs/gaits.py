@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from tca_mj.envs.command import Following
 from tca_mj.envs.recipe import HELD, Recipe
 from tca_mj.envs.stance import LEG_TCAS
 from tca_mj.envs.table import Entry, Table
@@ -55,6 +59,7 @@ class GaitTask:
     Attributes:
         bend: Angle between the ends of the spines [rad].
         speed: The published speed [m/s]; Sun, Section 6.3.2.
+        scripted: What the script walks at on the nominal robot, docs/tetrapod.md [m/s].
         beam: Height of the beam that the robot stands astride of, or None for the ground [m].
         yaw_range: Largest angle by which the robot may look aside at the start [rad].
         fastest: Commanded speed that means as fast as it can [m/s].
@@ -64,6 +69,7 @@ class GaitTask:
 
     bend: float
     speed: float
+    scripted: float
     beam: float | None = None
     yaw_range: float = 0.05
     fastest: float = 0.012
@@ -73,13 +79,32 @@ class GaitTask:
 
 TASKS = {
     # Sun's crawling robot is "almost flat": it keeps the memorised shape.
-    "crawl": GaitTask(bend=TetrapodSpec().memory_angle, speed=2.4e-3),
-    "walk": GaitTask(bend=math.radians(93.0), speed=9e-3),
+    "crawl": GaitTask(bend=TetrapodSpec().memory_angle, speed=2.4e-3, scripted=4.3e-3),
+    "walk": GaitTask(bend=math.radians(93.0), speed=9e-3, scripted=6.9e-3),
     # Sun prints neither the angle of the U nor the beam. Both (the beam in beam.xml, 34 mm wide)
     # are chosen so that legs press the beam while they are nearly straight: bent, they twist.
-    "shimmy": GaitTask(bend=math.radians(215.0), speed=0.75e-3, beam=0.12, yaw_range=0.005,
-                       turning=0.0, ways=(0.0, math.pi)),
+    "shimmy": GaitTask(bend=math.radians(215.0), speed=0.75e-3, scripted=3.3e-3, beam=0.12,
+                       yaw_range=0.005, turning=0.0, ways=(0.0, math.pi)),
 }
+
+def told(now: Following, rotation: NDArray[np.float64], fastest: float) -> dict[str, ArrayLike]:
+    """Rows of the table that say what is commanded, and how well it is followed.
+
+    Args:
+        now: That.
+        rotation: Of the hub, its axes as columns, shape (3, 3).
+        fastest: Commanded speed that means as fast as it can [m/s].
+    """
+    course = np.array([math.cos(now.course), math.sin(now.course)])
+    return {
+        "commanded direction": course @ rotation[:2, :2],
+        "commanded speed": min(now.command.speed, fastest),
+        "lead": min(now.lead, FAR),
+        "way aside": min(max(now.aside, -FAR), FAR),
+        "commanded turning": now.command.turning,
+        "heading error": now.error,
+    }
+
 
 # After how many decisions it was learned, and whose steps come first: the script's crawl moves all
 # legs together, and so would the learner.
@@ -97,3 +122,21 @@ RECIPES = {
     for gait, (steps, first) in _LEARNED.items()
 }  # fmt: skip
 """By gait and algorithm."""
+
+# All three shapes by one policy. The bend tells them apart, and is therefore scaled to what it is:
+# from flat to the U it goes from -0.9 to 0.9.
+SHAPED = Table(
+    [
+        replace(row, centre=2.0, scale=2.0) if row.name == "body bend" else row
+        for row in OBSERVATION.entries
+    ]
+)
+SPREAD = math.radians(10.0)  # by which a bend may be off that of its gait, at most [rad]
+SHAPES = {
+    "sac": Recipe.held(
+        30_000, 0.4, timestep=10e-3, options={"randomise": 0.2, "bend_spread": math.radians(3.0)},
+        mirrored=True, start="scripted", interval=2500,
+        learner={**HELD, "hidden": (256, 256), "learning_starts": 3000},
+    ),
+}  # fmt: skip
+"""By algorithm: how all shapes are learned at once."""

@@ -78,6 +78,6 @@ class Recipe(Checked):
             ValueError: If a field is out of bounds.
         """
         return cls(
-            steps=steps, control_period=control_period, scaled=True, discount=0.94, interval=1000,
-            **{"learner": HELD, **more},
+            steps=steps, control_period=control_period, scaled=True, discount=0.94,
+            **{"interval": 1000, "learner": HELD, **more},
         )  # fmt: skip

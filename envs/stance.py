@@ -8,7 +8,7 @@ from typing import Annotated
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from tca_mj.checks import Angle, Positive, door, number, require_one_of, row
 from tca_mj.model.part import Part
@@ -195,6 +195,28 @@ class Stance:
             legs = self._leg[geoms]
             touched[legs[legs >= 0]] = 1.0
         return touched
+
+    def sensed(self, sim: Simulation, above: float) -> dict[str, ArrayLike]:
+        """What a gait sees of the robot: the rows of its table up to the bend of the body.
+
+        Args:
+            sim: The simulation.
+            above: Height of what it stands on or astride of [m].
+        """
+        data, turn = sim.data, sim.data.xquat[self.hub]
+        linear, angular = self.velocity(data)
+        return {
+            "TCA temperature": sim.temperature[:LEG_TCAS],
+            "TCA length": sim.length[:LEG_TCAS],
+            "TCA tension": sim.tension[:LEG_TCAS],
+            "orientation": turn if turn[0] >= 0.0 else -turn,
+            "height": self.position(data)[2] - above,
+            "velocity": linear,
+            "angular velocity": angular,
+            "foot position": self.feet_in_body(data),
+            "leg contact": self.touching(data),
+            "body bend": self.bend(data),
+        }
 
     @door
     def placer(

@@ -22,11 +22,12 @@ from tca_mj.envs.command import (
     commanded,
     drawn,
 )  # fmt: skip
-from tca_mj.envs.gaits import ACTION, FAR, OBSERVATION, RECIPES, TASKS
+from tca_mj.envs.gaits import ACTION, OBSERVATION, RECIPES, TASKS, GaitTask, told
 from tca_mj.envs.options import Constant, Option, Options, Setup, Uniform, variation_options
 from tca_mj.envs.outcome import Headway, TaskState, Verdict
 from tca_mj.envs.recipe import Recipe
-from tca_mj.envs.stance import CAMERAS, LEG_TCAS, Stance, tetrapod_scene
+from tca_mj.envs.stance import CAMERAS, Stance, tetrapod_scene
+from tca_mj.envs.table import Table
 from tca_mj.envs.task import SimulatedTask, TaskArguments, parts
 from tca_mj.envs.vector import TaskVector
 from tca_mj.robots.tetrapod import LEGS, TetrapodSpec
@@ -121,6 +122,8 @@ class TetrapodGait(SimulatedTask):
     robot_argument = ("robot", TetrapodSpec)
     finer = {"legs": _fine_legs, "fine": _fine_body}
     legs = len(LEGS)
+    table: ClassVar[Table] = OBSERVATION
+    spot: tuple[float, float] = (0.0, 0.0)  # where it is put down, x and y [m]
     bend_range: ClassVar[float] = math.radians(1.0)  # largest deviation of the body's bend [rad]
 
     @door
@@ -148,7 +151,6 @@ class TetrapodGait(SimulatedTask):
             ValueError: If an argument is unknown or out of range, or the robot cannot be built.
         """
         self.gait = require_one_of("gait", gait, list(TASKS))
-        self.task = TASKS[gait]
         self.robot = self._robot(robot, common)
         objects = {} if self.task.beam is None else {"beam": mjcf("beam.xml")}
         sim = tetrapod_scene(
@@ -163,7 +165,7 @@ class TetrapodGait(SimulatedTask):
         self.stance = Stance(sim, self.robot)
         longest, spec = float(sim.bank.longest.max()), self.robot
         size = spec.spine.length + spec.rail_length + 2.0 * longest
-        seen = OBSERVATION.covering(
+        seen = self.table.covering(
             {"TCA length": (0.0, longest), "foot position": (-size, size), "height": (-size, size)}
         )
         self._open(sim, seen, ACTION, self._options(), **common)
@@ -172,6 +174,16 @@ class TetrapodGait(SimulatedTask):
         self._bend, self._gravity = self.task.bend, (0.0, 0.0, -9.81)
         self._push, self._pushes, self._push_every, self._push_way = 0.0, 0, 1.0, 0.0
         self._try("robot", robot)
+
+    @property
+    def task(self) -> GaitTask:
+        """What is asked for."""
+        return TASKS[self.gait]
+
+    @property
+    def reference(self) -> float:
+        """The speed that earns 1 per second [m/s]."""
+        return self.task.speed
 
     @classmethod
     def recipes_for(cls, arguments: Mapping[str, Any]) -> Mapping[str, Recipe]:
@@ -229,7 +241,9 @@ class TetrapodGait(SimulatedTask):
         self._gravity = across * math.cos(uphill), across * math.sin(uphill), down
         self.model.opt.gravity[:] = self._gravity
         self.sim.reset(
-            self.stance.placer(bend=self._bend, yaw=setup["yaw"], above=task.beam or 0.0)
+            self.stance.placer(
+                bend=self._bend, position=self.spot, yaw=setup["yaw"], above=task.beam or 0.0
+            )
         )
         self.sim.step(np.zeros(self.sim.n), _SETTLING)
         self.data.time = 0.0
@@ -315,7 +329,7 @@ class TetrapodGait(SimulatedTask):
         before = self._following
         self._following = before.moved(*self._place(), self._yaw(), self.interval)
         tilt = 1.0 - float(self.stance.rotation(self.data)[2, 2])
-        terms = self._following.earned(before, self.task.speed)
+        terms = self._following.earned(before, self.reference)
         terms["posture"] = -0.2 * self.share * tilt
         if self.sim.time >= self._until - 1e-9:
             self._draw_command()
@@ -333,41 +347,20 @@ class TetrapodGait(SimulatedTask):
 
     def observe(self) -> dict[str, ArrayLike]:
         """See ``OBSERVATION``."""
-        data, sim, stance = self.data, self.sim, self.stance
-        turn = data.xquat[stance.hub]
-        linear, angular = stance.velocity(data)
-        return {
-            "TCA temperature": sim.temperature[:LEG_TCAS],
-            "TCA length": sim.length[:LEG_TCAS],
-            "TCA tension": sim.tension[:LEG_TCAS],
-            "orientation": turn if turn[0] >= 0.0 else -turn,
-            "height": stance.position(data)[2] - (self.task.beam or 0.0),
-            "velocity": linear,
-            "angular velocity": angular,
-            "foot position": stance.feet_in_body(data),
-            "leg contact": stance.touching(data),
-            "body bend": stance.bend(data),
-            **self._told(),
-        }
+        return {**self.stance.sensed(self.sim, self.task.beam or 0.0), **self._told()}
 
     def _told(self) -> dict[str, ArrayLike]:
         """Rows of the observation that say what is commanded, and how well it is followed."""
-        now = self._following
-        course = np.array([math.cos(now.course), math.sin(now.course)])
-        return {
-            "commanded direction": course @ self.stance.rotation(self.data)[:2, :2],
-            "commanded speed": min(now.command.speed, self.task.fastest),
-            "lead": min(now.lead, FAR),
-            "way aside": min(max(now.aside, -FAR), FAR),
-            "commanded turning": now.command.turning,
-            "heading error": now.error,
-        }
+        turn = self.stance.rotation(self.data)
+        return told(self._following, turn, self.task.fastest)
 
     @property
     def retelling(self) -> Retelling:
         """How memories are told with other commands."""
         task = self.task
-        return Retelling(self.observation, task.speed, task.fastest, task.ways, self.control_period)
+        return Retelling(
+            self.observation, self.reference, task.fastest, task.ways, self.control_period
+        )
 
     def details(self) -> dict[str, Any]:
         """Headway [m], speed [m/s] and how far it looks from where it ought to [rad]."""

@@ -108,6 +108,11 @@ TASKS = (
         for gait in ("crawl", "walk", "shimmy")
     ),
     Task(
+        id="TCA/TetrapodShapes-v0",
+        entry_point="tca_mj.envs.shapes:TetrapodShapes",
+        max_episode_steps=600,
+    ),
+    Task(
         id="TCA/TetrapodCourse-v0",
         entry_point="tca_mj.envs.course:TetrapodCourse",
         max_episode_steps=15000,

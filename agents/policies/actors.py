@@ -185,3 +185,28 @@ def first_gait(task: str, start: str) -> tuple[Gait, tuple[float, ...]]:
         raise ValueError(f"start must be a policy with a gait, got {start}, which {task} has not")
     gait = replace(script.gait, offset=TROT) if start == "trot" else script.gait
     return gait, tuple(np.broadcast_to(script.steering, gait.legs).tolist())
+
+
+@door
+def first_gaits(task: str, start: str) -> Callable[[Any], Gait]:
+    """The gait from which something starts, where that may depend on what an episode draws.
+
+    Args:
+        task: Gymnasium id.
+        start: As for ``first_gait``.
+
+    Returns:
+        A function from a task, whose episode has begun, to the gait: that of its script's method
+        ``gait_of``, where it has one.
+
+    Raises:
+        FileNotFoundError, ValueError: As ``first_gait``.
+    """
+    if start == "scripted":
+        env = make(task, disable_env_checker=True, **arguments_of("scripted", task))
+        several: Callable[[Any], Gait] | None = getattr(scripted(env), "gait_of", None)
+        env.close()
+        if several is not None:
+            return several
+    gait, _ = first_gait(task, start)
+    return lambda task: gait

@@ -8,6 +8,7 @@ harden, release. All it knows is the observation.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -54,17 +55,19 @@ class Go(Checked):
     Attributes:
         name: Name of the stage.
         gait: Whose temperatures the legs follow; several are tried in turn where one does not get
-            on.
+            on. A name is that of a shape in which the walker has learned to get on.
         until: Where the stage ends, along x [m].
         patience: Time without headway after which the stage ends wherever the body is [s].
         steers: Whether the legs of one side become weaker where the heading is off.
+        above: Height of what the robot stands on, of which a learned gait sees its own [m].
     """
 
     name: str
-    gait: Gait | tuple[Gait, ...]
+    gait: Gait | str | tuple[Gait | str, ...]
     until: float
     patience: Edge = math.inf
     steers: bool = False
+    above: float = 0.0
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -79,6 +82,11 @@ class Bend(Checked):
         reaching: Whether the rear legs reach forward while the body is soft, clear of the desk;
             later all legs walk, until the body is bent.
         enough: Bend up to which the stage is left out; None: never [rad].
+        ahead: Way before the stage's place from which on the spines are warmed, still rigid [m].
+        brisk: Whether the spines begin to cool as soon as the body has its shape, with the fan.
+        stiff: Temperature of the spines below which the legs go on. The TCAs hold the shape until
+            they are below ``CourseWalker.rigid`` [°C].
+        rest: Time after that in which the legs come back where they were braced, or stand [s].
     """
 
     name: str
@@ -87,6 +95,10 @@ class Bend(Checked):
     braced: bool = False
     reaching: bool = False
     enough: float | None = None
+    ahead: float = 0.0
+    brisk: bool = False
+    stiff: float = 75.0
+    rest: float = 10.0
 
 
 @door
@@ -111,7 +123,8 @@ def stages(places: Places) -> tuple[Go | Bend, ...]:
         Go(name="step off", gait=HURRY, until=end + station - 0.015, patience=60.0),
         # As wide each time as curled legs can open it; between, the legs stretch.
         *(
-            Bend(name="open", angle=np.radians(angle), steps=STEP, braced=True, enough=wide)
+            Bend(name="open", angle=np.radians(angle), steps=STEP, braced=True, rest=20.0,
+                 enough=wide)
             for angle in (165.0, 130.0, 97.0, 97.0, 97.0)
         ),
         Go(name="walk on", gait=WALK, until=places.target, steers=True),
@@ -127,14 +140,24 @@ class CourseWalker:
 
     soft = 116.0  # spines are hot enough to be bent [°C]
     rigid = 75.0  # spines are cold enough to be let go [°C]
+    warm = 80.0  # spines are warmed to this ahead of a change of shape, and still rigid [°C]
+    easing = 0.3  # by which the TCAs cool while spines that cool fast become stiff [K/s]
     hottest = 172.0  # temperature that no TCA is to exceed [°C]
     stalled = 35.0  # time without headway after which another gait is tried [s]
 
-    def __init__(self, env: TetrapodCourse) -> None:
+    def __init__(
+        self,
+        env: TetrapodCourse,
+        plan: Sequence[Go | Bend] | None = None,
+        learned: Callable[[str, float, bool], Array] | None = None,
+    ) -> None:
         """Reads limits and places of a task, never its state.
 
         Args:
             env: The task.
+            plan: The course, stage by stage; by default ``stages``.
+            learned: What learned gaits ask of the legs, shape (4, 3) [°C], from the name of a
+                shape, the height of what the robot stands on [m], and whether the stage begins.
 
         Raises:
             ValueError: If the action is not the power of the TCAs.
@@ -144,7 +167,8 @@ class CourseWalker:
         self._dt = env.control_period
         self._max_power = env.max_power
         self._voltage = env.max_voltage
-        self._plan = stages(env.places)
+        self._plan = stages(env.places) if plan is None else tuple(plan)
+        self._learned, self._fan = learned, env.fan
         self._thermostat = Thermostat(
             heat=env.sim.bank.heat, max_power=env.max_power, max_temperature=self.hottest
         )
@@ -153,6 +177,7 @@ class CourseWalker:
     def reset(self) -> None:
         """Back to the start of the course."""
         self._number = 0
+        self._held = _OFF  # temperature at which the spines' TCAs hold a shape that cools
         self._body = np.array(self._thermostat.heat.ambient)  # unseen, but followed
         self._enter()
 
@@ -177,18 +202,24 @@ class CourseWalker:
             self._number += 1
             self._enter()
         legs, spines, voltage = np.full((4, 3), _OFF), _OFF, np.zeros(3)
+        blows = seen["spine temperature"].max() > self.rigid
         if self._number < len(self._plan):
             stage = self._plan[self._number]
             if isinstance(stage, Go):
-                legs = self._walk(stage, seen)
+                # To relax is harmless, to contract is not.
+                self._held = self._held - self.easing * self._dt if blows else _OFF
+                legs, spines = self._walk(stage, seen), self._held
+                voltage = self._warmed(stage, seen)
             else:
                 legs, spines, voltage = self._bend(stage, seen)
+                self._held = spines
         self._time += self._dt
         target = np.concatenate([np.maximum(legs, 25.0).ravel(), np.full(3, spines)])
         now = seen["TCA temperature"]
         power = self._thermostat.power(now, target, self._body)
         self._body = self._thermostat.heat.body_after(self._body, now, self._dt)
-        action = np.concatenate([power / self._max_power, voltage / self._voltage])
+        fan = [float(blows and not voltage.any())] if self._fan else []
+        action = np.concatenate([power / self._max_power, voltage / self._voltage, fan])
         return (2.0 * action - 1.0).astype(np.float32)
 
     def _over(self, seen: dict[str, Array]) -> bool:
@@ -207,6 +238,9 @@ class CourseWalker:
     def _walk(self, stage: Go, seen: dict[str, Array]) -> Array:
         gaits = stage.gait if isinstance(stage.gait, tuple) else (stage.gait,)
         gait = gaits[self._choice % len(gaits)]
+        if isinstance(gait, str):
+            assert self._learned is not None
+            return self._learned(gait, stage.above, self._time == 0.0)
         legs = gait.temperature(self._time / gait.period).reshape(4, 3)
         if stage.steers:
             w, _, _, z = seen["orientation"]
@@ -215,6 +249,14 @@ class CourseWalker:
             legs[[0, 2]] -= max(-weaker, 0.0)
             legs[[1, 3]] -= max(weaker, 0.0)
         return legs
+
+    def _warmed(self, stage: Go, seen: dict[str, Array]) -> Array:
+        """Voltages that warm the spines ahead of the stage that comes next."""
+        coming = self._plan[self._number + 1] if self._number + 1 < len(self._plan) else None
+        left = stage.until - float(seen["position"][0])
+        if not isinstance(coming, Bend) or left > coming.ahead:
+            return np.zeros(3)
+        return np.where(seen["spine temperature"] < self.warm, self._voltage, 0.0)
 
     def _bend(self, stage: Bend, seen: dict[str, Array]) -> tuple[Array, float, Array]:
         """Temperatures of the legs and of the spines' TCAs, and voltages of the heaters."""
@@ -231,10 +273,11 @@ class CourseWalker:
             if hot > self.soft:
                 self._go_on("bend")
         elif self._part in ("bend", "hold"):
-            voltage = boost
+            voltage = np.zeros(3) if stage.brisk and self._part == "hold" else boost
             if stage.angle is None:
                 stepping = True  # or the feet hold the body as it is
-                if self._time > 15.0:
+                flat = stage.brisk and self._time > 5.0 and abs(rate) < np.radians(0.5)
+                if self._time > 15.0 or flat:
                     self._go_on("harden")
             else:
                 gain = 0.6 if self._part == "bend" else 0.2
@@ -250,17 +293,20 @@ class CourseWalker:
                     still = near and abs(rate) < np.radians(1.0)
                     if (still and self._time > 5.0) or self._time > 60.0:
                         self._go_on("hold")
-                elif self._time > 6.0:
+                elif self._time > (2.0 if stage.brisk else 6.0):
                     # As warm as they are, and no warmer: to contract now would damage them.
-                    self._target = float(seen["TCA temperature"][-SPINES:].mean())
+                    now = seen["TCA temperature"][-SPINES:]
+                    self._target = float(now.min() - 1.0 if stage.brisk else now.mean())
                     self._go_on("harden")
         elif self._part == "harden":
-            if cold < self.rigid:
-                self._go_on("release" if stage.angle is not None else "done")
+            if stage.brisk and stage.angle is not None:
+                self._target -= self.easing * self._dt
+            if cold < stage.stiff:
+                self._go_on("release" if stage.angle is not None and stage.rest else "done")
         elif self._part == "release":
             self._target = 25.0
             stepping = stage.braced
-            if self._time > (20.0 if stage.braced else 10.0):
+            if self._time > stage.rest:
                 self._go_on("done")
         legs = np.full((4, 3), _OFF)
         if stage.reaching and self._part in ("soften", "bend"):

@@ -7,13 +7,18 @@ all legs, 120 to 216 gaits of which each went for half a minute; the walk's on f
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import MappingProxyType
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
+from tca_mj.agents.policies.actors import TROT
 from tca_mj.agents.policies.gait import GaitPolicy
 from tca_mj.checks import door, require_one_of
 from tca_mj.control import Gait
-from tca_mj.envs.gaits import OBSERVATION
+from tca_mj.envs.gaits import OBSERVATION, SHAPED, TASKS
 from tca_mj.envs.stance import LEG_TCAS
 from tca_mj.envs.tetrapod import TetrapodGait
 from tca_mj.robots.tetrapod import TetrapodSpec, tetrapod
@@ -65,6 +70,42 @@ def gait_policy(gait: str, robot: TetrapodSpec | None = None) -> GaitPolicy:
     require_one_of("gait", gait, list(GAITS))
     heat = heat_of([tca.spec for tca in tetrapod(robot or TetrapodSpec()).tcas[:LEG_TCAS]])
     return GaitPolicy.told_of(TetrapodGait, OBSERVATION, heat, GAITS[gait], STEERING[gait])
+
+
+class EveryGait:
+    """In whatever shape a ``TetrapodShapes`` is, the gait of the task of that shape.
+
+    The crawl is the trot of the script's: diagonal legs half a cycle apart, which is faster.
+    """
+
+    phase = "gait"
+
+    @door
+    def __init__(self, task: TetrapodGait) -> None:
+        """Makes the three.
+
+        Args:
+            task: The task.
+        """
+        self._gaits = dict(GAITS, crawl=replace(CRAWL, offset=TROT))
+        self._policies = {
+            gait: GaitPolicy.in_task(task, self._gaits[gait], STEERING[gait]) for gait in GAITS
+        }
+
+    def reset(self) -> None:
+        """Starts anew."""
+        for policy in self._policies.values():
+            policy.reset()
+
+    def act(self, observation: NDArray[np.float32]) -> NDArray[np.float32]:
+        """The action of the gait whose bend is nearest to what is seen."""
+        bend = float(SHAPED.read(observation)["body bend"][0])
+        nearest = min(GAITS, key=lambda gait: abs(TASKS[gait].bend - bend))
+        return self._policies[nearest].act(observation)
+
+    def gait_of(self, task: TetrapodGait) -> Gait:
+        """The gait of the shape that a task is in now."""
+        return self._gaits[task.gait]
 
 
 def scripted(task: Any) -> GaitPolicy:

@@ -31,7 +31,7 @@ from stable_baselines3.common.vec_env import VecEnv, VecNormalize
 from tca_mj.agents.episode import RECORDING, VIDEO, Episode
 from tca_mj.agents.output import write_csv
 from tca_mj.agents.policies import Model, Network, SavedPolicy, Statistics
-from tca_mj.agents.policies.actors import first_gait
+from tca_mj.agents.policies.actors import first_gait, first_gaits
 from tca_mj.agents.policies.contracts import contract, differences
 from tca_mj.agents.progress import progress_bar
 from tca_mj.agents.rollout import earned, rollout
@@ -79,7 +79,7 @@ def train(
         KeyboardInterrupt: As it came; the same call goes on from the last interval.
     """
     if config.start != "random":
-        first_gait(config.task, config.start)  # before a file is touched
+        first_gaits(config.task, config.start)  # before a file is touched
     with ExitStack() as ends:
         ends.enter_context(claimed(out))
         ends.callback(torch.set_num_threads, torch.get_num_threads())
@@ -211,7 +211,7 @@ class Run:
         if config.start == "random" or config.residual:
             return
         self.begin()
-        gait, _ = first_gait(config.task, config.start)
+        gait = first_gaits(config.task, config.start)
         first = min(config.learner.learning_starts, config.steps)  # type: ignore[union-attr]
         demonstrate(self.model, self.env.venv.tasks.envs, gait, first, config.seed)
 

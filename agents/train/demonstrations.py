@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -18,8 +19,9 @@ _HURRY, _NOISE = 0.1, 0.15
 
 
 def demonstrate(
-    model: BaseAlgorithm, tasks: list[SimulatedTask], gait: Gait, steps: int, seed: int
-) -> None:
+    model: BaseAlgorithm, tasks: list[SimulatedTask], gait: Callable[[SimulatedTask], Gait],
+    steps: int, seed: int,
+) -> None:  # fmt: skip
     """Fills the memory of a new learner with steps of a gait, in place of steps by chance.
 
     Every episode begins somewhere in the cycle and goes a little faster or slower; every action is
@@ -28,7 +30,7 @@ def demonstrate(
     Args:
         model: An off-policy learner of Stable-Baselines3 with scaled observations.
         tasks: The tasks that are stepped there, whose actions are temperatures.
-        gait: The gait.
+        gait: The gait of an episode that a task has just begun.
         steps: Steps of all tasks together.
         seed: Seed of what is drawn.
     """
@@ -36,16 +38,18 @@ def demonstrate(
     memory: Any = model.replay_buffer  # type: ignore[attr-defined]
     random = np.random.default_rng((seed, 2))
     phase, pace = np.zeros(len(tasks)), np.ones(len(tasks))
+    gaits: dict[int, Gait] = {}
 
     def begin(i: int) -> None:
         phase[i], pace[i] = random.uniform(), random.uniform(1.0 - _HURRY, 1.0 + _HURRY)
+        gaits[i] = gait(tasks[i])
 
+    seen = env.reset()
     for i in range(len(tasks)):
         begin(i)
-    seen = env.reset()
     while model.num_timesteps < steps:
         actions = np.stack([
-            _asked(task, gait, phase[i], pace[i]) for i, task in enumerate(tasks)
+            _asked(task, gaits[i], phase[i], pace[i]) for i, task in enumerate(tasks)
         ])  # fmt: skip
         actions += _NOISE * random.standard_normal(actions.shape)
         actions = np.clip(actions, -1.0, 1.0).astype(np.float32)

@@ -1,0 +1,131 @@
+"""The tetrapod's course in less time: shapes change faster, and learned gaits carry the robot.
+
+What takes time to change a shape is that spines cool: from 116 to 75 °C in 27 s in still air, in
+12 s with the fan. Here they are warmed while the robot still walks, cool as soon as the body has
+its shape, and the legs go on at 88 °C, where the spines are half as stiff as cold ones, while the
+TCAs hold the shape until they are rigid.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tca_mj.agents.policies.files import SavedPolicy
+from tca_mj.agents.policies.load import find
+from tca_mj.agents.scripts.course import HURRY, PUSH, STEP, Bend, CourseWalker, Go
+from tca_mj.agents.scripts.tetrapod import CRAWL, WALK
+from tca_mj.control import Gait
+from tca_mj.envs.command import Command, Following
+from tca_mj.envs.course import Places, TetrapodCourse
+from tca_mj.envs.gaits import OBSERVATION, SHAPED, TASKS, told
+from tca_mj.variation import AMBIENT
+
+Array = NDArray[np.float64]
+Gaits = Mapping[str, Gait | str | tuple[Gait | str, ...]]
+
+SHOVE = replace(PUSH, hot=(172.0,) * 3, warm=(60.0,) * 3)
+"""``PUSH`` with hotter TCAs, which are quicker: 15 % faster on the robot that it was tried on."""
+
+SCRIPTED: Gaits = {"crawl": CRAWL, "walk": WALK, "mount": SHOVE, "shimmy": HURRY}
+LEARNED: Gaits = {"crawl": "crawl", "walk": "walk", "mount": SHOVE, "shimmy": ("shimmy", *HURRY)}
+SPECIALISTS = {gait: f"tetrapod-{gait}-sac" for gait in TASKS}
+SHAPES = dict.fromkeys(TASKS, "tetrapod-shapes")
+
+
+def quick(places: Places, gaits: Gaits) -> tuple[Go | Bend, ...]:
+    """The course, stage by stage.
+
+    Args:
+        places: Where things are along it.
+        gaits: How it crawls and walks.
+    """
+    station, edge, end = places.leg_station, places.first_edge, places.beam_end
+    walking, wide = math.radians(95.0), math.radians(115.0)
+    crawl, walk = gaits["crawl"], gaits["walk"]
+    brisk = {"brisk": True, "stiff": 88.0, "rest": 0.0}
+    return (
+        Go(name="crawl", gait=crawl, until=places.stand, steers=True),
+        Bend(name="stand up", angle=walking, steps=WALK, ahead=0.03, **brisk),
+        Go(name="walk", gait=walk, until=edge - station + 0.019, steers=True),
+        Go(name="mount", gait=gaits["mount"], until=edge + station + 0.004, patience=25.0, steers=True),
+        Bend(name="clamp", angle=math.radians(213.0), reaching=True, ahead=0.01, **brisk),
+        Go(name="shimmy", gait=gaits["shimmy"], until=end - 0.005, patience=200.0,
+           above=places.beam_top),
+        Go(name="step off", gait=gaits["shimmy"], until=end + station - 0.015, patience=60.0,
+           above=places.beam_top),
+        *(
+            Bend(name="open", angle=math.radians(angle), steps=STEP, braced=True, enough=wide,
+                 **{**brisk, "rest": 10.0})
+            for angle in (165.0, 130.0, 97.0, 97.0, 97.0)
+        ),
+        Go(name="walk on", gait=walk, until=places.target, steers=True, above=places.lower),
+        Bend(name="lie down", angle=None, steps=STEP, ahead=0.05, brisk=True, rest=0.0),
+    )  # fmt: skip
+
+
+class Learned:
+    """What learned gaits ask of the legs on the course: new temperatures every 0.4 s.
+
+    They see what they saw when they learned: the robot's own motion, TCAs, feet and contacts, and
+    how far it is off the line down the middle of the course.
+    """
+
+    def __init__(self, task: TetrapodCourse, policies: Mapping[str, str]) -> None:
+        """Reads the policies.
+
+        Args:
+            task: The task.
+            policies: Name or file of the policy of each shape.
+        """
+        self._task = task
+        self._saved = {gait: SavedPolicy.read(find(name)) for gait, name in policies.items()}
+        self._following, self._time = Following(Command()), 0.0
+        self._asked = np.full((4, 3), AMBIENT)
+
+    def __call__(self, gait: str, above: float, begins: bool) -> Array:
+        """Temperatures, shape (4, 3) [°C]; see ``CourseWalker``."""
+        task, saved, shape = self._task, self._saved[gait], TASKS[gait]
+        x, y, _ = task.position.tolist()
+        turn = task.stance.rotation(task.data)
+        yaw, dt = math.atan2(turn[1, 0], turn[0, 0]), task.control_period
+        if begins:
+            new = Following(Command(), place=(x, y), aside=y)
+            self._following, self._time = new.moved(x, y, yaw, 0.0), 0.0
+        else:
+            self._following = self._following.moved(x, y, yaw, dt)
+        period = float(saved.arguments["control_period"])
+        if self._time % period < dt / 2.0 or period - self._time % period < dt / 2.0:
+            rows = task.stance.sensed(task.sim, above)
+            rows |= told(self._following, turn, shape.fastest)
+            table = SHAPED if "Shapes" in saved.task else OBSERVATION
+            assert saved.network is not None
+            asked = saved.network(table.pack(rows)).astype(np.float64)
+            self._asked = (AMBIENT + (asked + 1.0) * (172.0 - AMBIENT) / 2.0).reshape(4, 3)
+        self._time += dt
+        return self._asked.copy()
+
+
+def scripted(task: TetrapodCourse) -> CourseWalker:
+    """The course in less time with the scripted gaits."""
+    return CourseWalker(task, quick(task.places, SCRIPTED))
+
+
+def searched(task: TetrapodCourse) -> CourseWalker:
+    """With the searched gaits that come with the package."""
+    gaits = {gait: SavedPolicy.read(find(f"tetrapod-{gait}")).gait for gait in SCRIPTED}
+    return CourseWalker(task, quick(task.places, gaits))
+
+
+def specialists(task: TetrapodCourse) -> CourseWalker:
+    """With the gaits that were learned each by its own."""
+    return CourseWalker(task, quick(task.places, LEARNED), Learned(task, SPECIALISTS))
+
+
+def shapes(task: TetrapodCourse) -> CourseWalker:
+    """With the one policy that has learned all shapes."""
+    return CourseWalker(task, quick(task.places, LEARNED), Learned(task, SHAPES))
