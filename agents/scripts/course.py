@@ -290,6 +290,8 @@ class CourseWalker:
                     # As far as it gets: a TCA that is off lets go no further, a hot one is spent.
                     spent = self._target < 26.0 if stage.braced else self._target >= self.hottest
                     near = abs(error) < (5.0 if not spent else 50.0 if stage.braced else 8.0)
+                    # Whom curled legs have opened further would only be bent back.
+                    near = near or (stage.brisk and stage.braced and 0.0 < error < 25.0)
                     still = near and abs(rate) < np.radians(1.0)
                     if (still and self._time > 5.0) or self._time > 60.0:
                         self._go_on("hold")
