@@ -141,6 +141,7 @@ class CourseWalker:
     soft = 116.0  # spines are hot enough to be bent [°C]
     rigid = 75.0  # spines are cold enough to be let go [°C]
     warm = 80.0  # spines are warmed to this ahead of a change of shape, and still rigid [°C]
+    walkable = np.radians(88.0)  # least bend at which it stands on its feet [rad]
     easing = 0.3  # by which the TCAs cool while spines that cool fast become stiff [K/s]
     hottest = 172.0  # temperature that no TCA is to exceed [°C]
     stalled = 35.0  # time without headway after which another gait is tried [s]
@@ -290,8 +291,9 @@ class CourseWalker:
                     # As far as it gets: a TCA that is off lets go no further, a hot one is spent.
                     spent = self._target < 26.0 if stage.braced else self._target >= self.hottest
                     near = abs(error) < (5.0 if not spent else 50.0 if stage.braced else 8.0)
-                    # Whom curled legs have opened further would only be bent back.
-                    near = near or (stage.brisk and stage.braced and 0.0 < error < 25.0)
+                    # Opened further than asked it need not be bent back, but to where it walks.
+                    opened = stage.brisk and stage.braced and error > 0.0
+                    near = near or (opened and angle > self.walkable)
                     still = near and abs(rate) < np.radians(1.0)
                     if (still and self._time > 5.0) or self._time > 60.0:
                         self._go_on("hold")
