@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -123,14 +123,7 @@ RECIPES = {
 }  # fmt: skip
 """By gait and algorithm."""
 
-# All three shapes by one policy. The bend tells them apart, and is therefore scaled to what it is:
-# from flat to the U it goes from -0.9 to 0.9.
-SHAPED = Table(
-    [
-        replace(row, centre=2.0, scale=2.0) if row.name == "body bend" else row
-        for row in OBSERVATION.entries
-    ]
-)
+# All three shapes by one policy.
 SPREAD = math.radians(10.0)  # by which a bend may be off that of its gait, at most [rad]
 SHAPES = {
     "sac": Recipe.held(

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from functools import partial
 from typing import Any, ClassVar, Unpack
 
 import numpy as np
 
 from tca_mj.checks import door
-from tca_mj.envs.gaits import SHAPED, SHAPES, SPREAD, TASKS
+from tca_mj.envs.gaits import OBSERVATION as OF_ONE
+from tca_mj.envs.gaits import SHAPES, SPREAD, TASKS
 from tca_mj.envs.options import Constant, Option, Options, Setup
 from tca_mj.envs.recipe import Recipe
 from tca_mj.envs.table import Table
@@ -19,6 +21,14 @@ from tca_mj.envs.vector import TaskVector
 from tca_mj.robots.tetrapod import TetrapodSpec
 from tca_mj.sim import Timestep
 
+# The bend tells the shapes apart, and is therefore scaled to what it is: from flat to the U it goes
+# from -0.8 to 0.9.
+OBSERVATION = Table(
+    [
+        replace(row, centre=2.0, scale=2.0) if row.name == "body bend" else row
+        for row in OF_ONE.entries
+    ]
+)
 _ASIDE = (0.0, 5.0)  # where it is put down if not onto the beam: far from that [m]
 
 
@@ -44,7 +54,7 @@ class TetrapodShapes(TetrapodGait):
     """
 
     scripted = "tca_mj.agents.scripts.tetrapod:EveryGait"
-    table: ClassVar[Table] = SHAPED
+    table: ClassVar[Table] = OBSERVATION
 
     @door
     def __init__(

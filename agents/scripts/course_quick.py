@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,30 +20,29 @@ from tca_mj.agents.policies.files import SavedPolicy
 from tca_mj.agents.policies.load import find
 from tca_mj.agents.scripts.course import HURRY, PUSH, STEP, Bend, CourseWalker, Go
 from tca_mj.agents.scripts.tetrapod import CRAWL, WALK
-from tca_mj.control import Gait
 from tca_mj.envs.command import Command, Following
 from tca_mj.envs.course import Places, TetrapodCourse
-from tca_mj.envs.gaits import OBSERVATION, SHAPED, TASKS, told
+from tca_mj.envs.gaits import OBSERVATION, TASKS, told
+from tca_mj.envs.shapes import OBSERVATION as SHAPED
 from tca_mj.variation import AMBIENT
 
 Array = NDArray[np.float64]
-Gaits = Mapping[str, Gait | str | tuple[Gait | str, ...]]
 
 SHOVE = replace(PUSH, hot=(172.0,) * 3, warm=(60.0,) * 3)
 """``PUSH`` with hotter TCAs, which are quicker: 15 % faster on the robot that it was tried on."""
 
-SCRIPTED: Gaits = {"crawl": CRAWL, "walk": WALK, "mount": SHOVE, "shimmy": HURRY}
-LEARNED: Gaits = {"crawl": "crawl", "walk": "walk", "mount": SHOVE, "shimmy": ("shimmy", *HURRY)}
+SCRIPTED: dict[str, Any] = {"crawl": CRAWL, "walk": WALK, "mount": SHOVE, "shimmy": HURRY}
+LEARNED: dict[str, Any] = {"crawl": "crawl", "walk": "walk", "mount": SHOVE, "shimmy": ("shimmy", *HURRY)}
 SPECIALISTS = {gait: f"tetrapod-{gait}-sac" for gait in TASKS}
 SHAPES = dict.fromkeys(TASKS, "tetrapod-shapes")
 
 
-def quick(places: Places, gaits: Gaits) -> tuple[Go | Bend, ...]:
+def quick(places: Places, gaits: Mapping[str, Any]) -> tuple[Go | Bend, ...]:
     """The course, stage by stage.
 
     Args:
         places: Where things are along it.
-        gaits: How it crawls and walks.
+        gaits: ``Go.gait`` of the stages: "crawl", "walk" (twice), "mount" and "shimmy" (twice).
     """
     station, edge, end = places.leg_station, places.first_edge, places.beam_end
     walking, wide = math.radians(95.0), math.radians(115.0)
@@ -52,7 +52,8 @@ def quick(places: Places, gaits: Gaits) -> tuple[Go | Bend, ...]:
         Go(name="crawl", gait=crawl, until=places.stand, steers=True),
         Bend(name="stand up", angle=walking, steps=WALK, ahead=0.03, **brisk),
         Go(name="walk", gait=walk, until=edge - station + 0.019, steers=True),
-        Go(name="mount", gait=gaits["mount"], until=edge + station + 0.004, patience=25.0, steers=True),
+        Go(name="mount", gait=gaits["mount"], until=edge + station + 0.004, patience=25.0,
+           steers=True),
         Bend(name="clamp", angle=math.radians(213.0), reaching=True, ahead=0.01, **brisk),
         Go(name="shimmy", gait=gaits["shimmy"], until=end - 0.005, patience=200.0,
            above=places.beam_top),
@@ -116,8 +117,9 @@ def scripted(task: TetrapodCourse) -> CourseWalker:
 
 
 def searched(task: TetrapodCourse) -> CourseWalker:
-    """With the searched gaits that come with the package."""
-    gaits = {gait: SavedPolicy.read(find(f"tetrapod-{gait}")).gait for gait in SCRIPTED}
+    """With the searched crawl and walk that come with the package."""
+    found = {gait: SavedPolicy.read(find(f"tetrapod-{gait}")).gait for gait in ("crawl", "walk")}
+    gaits = SCRIPTED | {gait: known for gait, known in found.items() if known is not None}
     return CourseWalker(task, quick(task.places, gaits))
 
 

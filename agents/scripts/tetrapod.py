@@ -18,7 +18,8 @@ from tca_mj.agents.policies.actors import TROT
 from tca_mj.agents.policies.gait import GaitPolicy
 from tca_mj.checks import door, require_one_of
 from tca_mj.control import Gait
-from tca_mj.envs.gaits import OBSERVATION, SHAPED, TASKS
+from tca_mj.envs.gaits import OBSERVATION, TASKS
+from tca_mj.envs.shapes import OBSERVATION as SHAPED
 from tca_mj.envs.stance import LEG_TCAS
 from tca_mj.envs.tetrapod import TetrapodGait
 from tca_mj.robots.tetrapod import TetrapodSpec, tetrapod
