@@ -2,6 +2,8 @@
 
     python scripts/course_table.py --seeds 10 --friction 0.2 --out runs/course/friction
     python scripts/course_table.py --seeds 10 --everything 0.2 --out runs/course/everything
+    python scripts/course_table.py --first 210 --everything 0.2 --out runs/course/quick
+        --policy tca_mj.agents.scripts.course_quick:specialists
 
 Prints a Markdown table, one row per seed, and writes each row to the folder as soon as it is known;
 rows that lie there already are not run again unless --fresh is given.
@@ -18,12 +20,12 @@ from tca_mj.agents.demo import play
 from tca_mj.envs.course import TetrapodCourse
 
 
-def row(seed: int, options: dict[str, float], out: Path) -> dict[str, object]:
+def row(seed: int, options: dict[str, float], out: Path, policy: str = "scripted") -> dict[str, object]:
     """The summary of one episode, from the folder or run now."""
     path = out / f"seed{seed}.json"
     if path.is_file():
         return json.loads(path.read_text(encoding="utf-8"))
-    result = play("TCA/TetrapodCourse-v0", seed=seed, options=options, progress=False)
+    result = play("TCA/TetrapodCourse-v0", policy, seed=seed, options=options, progress=False)
     path.write_text(json.dumps(result, indent=2), encoding="utf-8")
     return result
 
@@ -34,6 +36,7 @@ def main(argv: list[str] | None = None) -> None:
     parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--friction", type=float, default=0.0, help="share by which it is off")
     parser.add_argument("--everything", type=float, default=0.0, help="the same of the robot")
+    parser.add_argument("--policy", default="scripted", help="who walks; each into its own --out")
     parser.add_argument("--out", type=Path, default=Path("runs/course"))
     parser.add_argument("--fresh", action="store_true")
     args = parser.parse_args(argv)
@@ -47,7 +50,7 @@ def main(argv: list[str] | None = None) -> None:
     print("|---" * (7 + len(names)) + "|", flush=True)
     rows = []
     for seed in range(args.first, args.first + args.seeds):
-        result = row(seed, options, args.out)
+        result = row(seed, options, args.out, args.policy)
         rows.append(result)
         speeds = {r["name"]: 1e3 * r["speed"] for r in result["speeds"]}
         energy = sum(result["energy"].values()) + sum(result["heater_energy"].values())

@@ -94,6 +94,7 @@ def test_the_course_shows_a_learned_gait_what_its_own_task_does(course, gait):
     seen, _ = alone.reset(seed=0, options={"yaw": 0.0, "bend": TASKS[gait].bend})
     course.reset(seed=0)
     course.sim.reset(course.stance.placer(bend=TASKS[gait].bend))
+    course.sim.step(np.zeros(course.sim.n), 0.5)  # it comes to rest, as there
     learned, shown = Learned(course, {gait: f"tetrapod-{gait}-sac"}), []
     saved = learned._saved[gait]
 
@@ -108,7 +109,7 @@ def test_the_course_shows_a_learned_gait_what_its_own_task_does(course, gait):
     assert len(shown) == 2 and asked[0].shape == (4, 3)  # held for 0.4 s
     assert (asked[0] == asked[3]).all()
     mine, its = OBSERVATION.read(shown[0]), OBSERVATION.read(seen)
-    for name, apart in {"height": 3e-3, "foot position": 4e-3, "body bend": 0.02,
+    for name, apart in {"height": 3e-3, "foot position": 4e-3, "body bend": 0.03,
                         "commanded direction": 0.01, "commanded speed": 1e-6,
                         "heading error": 0.01, "TCA length": 1e-3}.items():  # fmt: skip
         assert mine[name] == pytest.approx(its[name], abs=apart), name
