@@ -20,7 +20,9 @@ from tca_mj.agents.demo import play
 from tca_mj.envs.course import TetrapodCourse
 
 
-def row(seed: int, options: dict[str, float], out: Path, policy: str = "scripted") -> dict[str, object]:
+def row(
+    seed: int, options: dict[str, float], out: Path, policy: str = "scripted"
+) -> dict[str, object]:
     """The summary of one episode, from the folder or run now."""
     path = out / f"seed{seed}.json"
     if path.is_file():

@@ -316,7 +316,8 @@ BY_SURFACE: dict[str, dict[str, Any]] = {
     "agents.policies.actors.arguments_of": {"name": "off", "task": TASK},
     "agents.policies.actors.best_of": {"name": "off"},
     "agents.policies.actors.actor": {"name": "off"},
-    "agents.policies.actors.first_gait": {"task": "TCA/TetrapodWalk-v0", "start": "scripted"},
+    **dict.fromkeys(("agents.policies.actors.first_gait", "agents.policies.actors.first_gaits"),
+                    {"task": "TCA/TetrapodWalk-v0", "start": "scripted"}),
     "agents.policies.files.SavedPolicy": {
         "task": TASK, "**": lambda: {"network": good(Network)},
     },
