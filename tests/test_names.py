@@ -63,7 +63,7 @@ INTERNAL = {
     "tca_mj.validation": {"": "*"},
     "tca_mj.envs": {
         "adaptive": "OBJECTS Thing", "command": "command_options commanded drawn",
-        "options": "variation_of",
+        "gaits": "told", "options": "variation_of",
         "holding": "*", "objects": "*",
         "outcome": "broken_off finite harm how_it_ended measured together",
         "recipe": "HELD", "rewards": "*",
@@ -78,14 +78,14 @@ INTERNAL = {
         "fit": "require_same", "predictive": "Foresight nothing planned",
     },
     "tca_mj.agents.policies": {
-        "actors": "called", "archives": "*", "load": "require_untold", "onnx": "*",
+        "actors": "called first_gaits", "archives": "*", "load": "require_untold", "onnx": "*",
     },
     "tca_mj.agents.scripts": {
         # one for each task, found by the task's ``scripted``
         "adaptive": "scripted", "arm": "scripted", "bistable_grasp": "scripted",
         "finger": "Run calibrate scripted", "grasp": "scripted", "jump": "scripted",
         "morph": "calibrate scripted",
-        "reach": "scripted", "tetrapod": "scripted",
+        "course_quick": "*", "reach": "scripted", "tetrapod": "EveryGait scripted",
     },
     "tca_mj.agents.train": {
         "config": "best_algorithm described", "deep": "Run exported film learner record",
