@@ -128,7 +128,8 @@ class TetrapodShapes(TetrapodGait):
 
 def _draw_gait(random: np.random.Generator, setup: Setup) -> str:
     """One of the three, from numbers that nothing else is drawn from."""
-    return str(np.random.Generator(random.bit_generator.jumped()).choice(list(TASKS)))
+    ahead: Any = random.bit_generator
+    return str(np.random.Generator(ahead.jumped()).choice(list(TASKS)))
 
 
 def _draw_bend(random: np.random.Generator, setup: Setup) -> float:

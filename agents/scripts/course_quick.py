@@ -49,7 +49,7 @@ def quick(places: Places, gaits: Mapping[str, Any]) -> tuple[Go | Bend, ...]:
     station, edge, end = places.leg_station, places.first_edge, places.beam_end
     walking, wide = math.radians(95.0), math.radians(115.0)
     crawl, walk = gaits["crawl"], gaits["walk"]
-    brisk = {"brisk": True, "stiff": 88.0, "rest": 0.0}
+    brisk: dict[str, Any] = {"brisk": True, "stiff": 88.0, "rest": 0.0}
     return (
         Go(name="crawl", gait=crawl, until=places.stand, steers=True),
         Bend(name="stand up", angle=walking, steps=WALK, ahead=0.03, **brisk),
