@@ -73,7 +73,7 @@ MIRRORED = {
     "TCA/Grasp-v0": ({"object_position": [8e-4, 3e-4]}, {"object_position": [-8e-4, 3e-4]}),
     "TCA/TetrapodCourse-v0": ({"position": [0.0, 2e-3], "yaw": 0.02},
                               {"position": [0.0, -2e-3], "yaw": -0.02}),
-    "TCA/TetrapodShapes-v0": ({"gait": "shimmy"}, {"gait": "shimmy"}),
+    "TCA/TetrapodShapes-v0": ({"gait": "shimmy", "yaw": 0.0, "direction": 0.0},) * 2,
     **{
         f"TCA/Tetrapod{gait}-v0": ({"yaw": yaw, "bend": bend, "direction": direction},
                                    {"yaw": -yaw, "bend": bend, "direction": -direction})
