@@ -85,15 +85,7 @@ class ClusterWorkers:
     def run(
         self, function: Callable[..., Found], jobs: Sequence[tuple[Any, ...]]
     ) -> Iterator[tuple[int, Found]]:
-        """Yields the number of each job and what came of it, in any order.
-
-        Args:
-            function: A function of a module; what it raises is raised here.
-            jobs: Its arguments, call by call.
-
-        Raises:
-            ChildProcessError: If a call was lost too often.
-        """
+        """As ``Workers.run``; ``ChildProcessError`` if a call was lost too often."""
         import ray
         from ray.exceptions import RayError, RayTaskError
 

@@ -87,6 +87,7 @@ TASKS = {
                        yaw_range=0.005, turning=0.0, ways=(0.0, math.pi)),
 }
 
+
 def told(now: Following, rotation: NDArray[np.float64], fastest: float) -> dict[str, ArrayLike]:
     """Rows of the table that say what is commanded, and how well it is followed.
 

@@ -40,8 +40,16 @@ class TetrapodShapes(TetrapodGait):
     ground are both there always. Action and observation are those of ``TetrapodGait``, but for the
     scale of the row "body bend", from which a policy can tell which of them it is.
 
-    Reward: as there, over the speed of the script in that shape in place of the published one.
-    Published speeds are 0.23 to 1.8 times the scripts', and the shimmy would count most.
+    Reward, the sum of the terms in ``info["reward_terms"]``, as there, over the speed of the script
+    in that shape in place of the published one, which is 0.23 to 1.8 times that:
+        progress: Distance gained along the commanded direction over the script's speed [s].
+        drift: Minus half of what is gained in distance from the commanded line, over that speed.
+        lead: Minus twice what is gained in distance ahead of the commanded speed, over that speed.
+        turn: Minus what is lost of the commanded heading, 0.1 m for a radian, over that speed.
+        posture: Minus 0.2 (1 - cosine of the tilt), every 0.1 s.
+        energy: Minus 0.002 per joule of electrical energy.
+        heat: Minus 0.002 for every kelvin by which a TCA is above ``hot_temperature``, every 0.1 s.
+        end: Minus 5 in the step in which the robot falls, or a TCA is too hot or torn.
 
     A seed draws the same robot as in the task of the single gait.
 

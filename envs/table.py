@@ -203,7 +203,8 @@ class Table:
             if len(each) != size:
                 raise ValueError(f"{name} must have {size} numbers, got {len(each)}")
             flat += each
-        return np.array(flat, dtype=np.float32)
+        with np.errstate(over="ignore"):  # what diverged is infinite, and so out of bounds
+            return np.array(flat, dtype=np.float32)
 
     def read(self, array: NDArray[Any]) -> dict[str, NDArray[Any]]:
         """The rows of an array of shape (..., size), by name."""

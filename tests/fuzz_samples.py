@@ -252,6 +252,7 @@ BY_SURFACE: dict[str, dict[str, Any]] = {
     "tca.mandrel.kept_share": {"groove_pitch_angle": 0.35, "annealing_temperature": 180.0},
     "tca.supply.Supply.checked": {"n": 1},
     "variation.Nominal.apply": {"variation": lambda: variation.Variation()},
+    "rod.problem.Spring.pull": {"way": [0.1, 0.0, 0.02]},
     "rod.beam.Outline.contains": {"x": 1e-3, "y": 1e-3},
     "agents.episode.Episode": {"names": (TASK, "off"), "out": None, "options": {}, "seed": 1},
     "agents.episode.Episode.run": {"limit": 0.2, "speed": 1.0, "progress": False},

@@ -50,8 +50,19 @@ class Spring(Checked):
     start: Triple = (0.0, 0.0, 0.0)
     end: Triple = (0.0, 0.0, 0.0)
 
-    def pull(self, way: Array) -> Array:
-        """Force on its end, if that is so far from its start, shape (3,) each [N], [m]."""
+    def pull(self, way: ArrayLike) -> Array:
+        """Force on its end [N].
+
+        Args:
+            way: From its start to its end, shape (3,) [m].
+
+        Returns:
+            The force, shape (3,); none where it is slack.
+
+        Raises:
+            ValueError: If the shape is wrong or a number not finite.
+        """
+        way = within("way", way, shape=(3,))
         long = float(np.linalg.norm(way))
         more = max(0.0, long - self.length)
         return -self.stiffness * more / long * way if more else np.zeros(3)
