@@ -188,7 +188,7 @@ def test_without_the_demo_extra_it_says_what_to_install(
     result = pick_and_place(policy=Stub(), out=tmp_path, max_duration=0.2)
     assert result["files"] == ["rollout.rrd"]
     assert sorted(result["left_out"]) == ["rollout.mp4", "rollout.png"]
-    assert capsys.readouterr().out.count("pip install matplotlib imageio") == 2
+    assert capsys.readouterr().out.count("pip install 'matplotlib>=3.9' 'imageio>=2.34'") == 2
 
 
 def test_importing_the_demo_loads_no_optional_package(tmp_path: Path) -> None:
