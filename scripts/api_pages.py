@@ -19,10 +19,10 @@ from tca_mj import pages
 from tca_mj.checks import shown
 
 PACKAGES = (
-    "tca_mj", "tca_mj.tca", "tca_mj.tca.identify", "tca_mj.rod", "tca_mj.smp", "tca_mj.control",
-    "tca_mj.model", "tca_mj.modules", "tca_mj.robots", "tca_mj.record", "tca_mj.envs",
-    "tca_mj.agents", "tca_mj.agents.model", "tca_mj.agents.policies", "tca_mj.agents.scripts",
-    "tca_mj.agents.train", "tca_mj.certify", "tca_mj.validation",
+    "tca_mj", "tca_mj.tca", "tca_mj.tca.identify", "tca_mj.tca.design", "tca_mj.rod", "tca_mj.smp",
+    "tca_mj.control", "tca_mj.model", "tca_mj.modules", "tca_mj.robots", "tca_mj.record",
+    "tca_mj.envs", "tca_mj.agents", "tca_mj.agents.model", "tca_mj.agents.policies",
+    "tca_mj.agents.scripts", "tca_mj.agents.train", "tca_mj.certify", "tca_mj.validation",
 )  # fmt: skip
 OFFERED = frozenset(name for package in PACKAGES for name in import_module(package).__all__)
 _CODE = re.compile(r"(``.+?``|`[^`]+`)", re.DOTALL)

@@ -48,6 +48,7 @@ LAYER_OF = {
 LOWEST = {
     "numpy": "routes",
     "scipy": "rod",
+    "pymoo": "tca",
     "mujoco": "model",
     "dm_control": "model",
     "imageio": "record",

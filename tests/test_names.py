@@ -39,6 +39,9 @@ INTERNAL = {
         "bench": "measured", "constants": "decoded encoded known_of", "data": "SHOWN", "fit": "*",
         "predict": "*", "reporting": "picture_name result",
     },
+    "tca_mj.tca.design": {
+        "candidates": "judged tightest", "reporting": "result",
+    },
     "tca_mj.rod": {
         "deadload": "*", "energy": "*", "lie": "*", "problem": "StaticProblem asked",
         "sections": "*", "shooting": "*", "solving": "*",

@@ -10,7 +10,7 @@ from contextlib import suppress
 from typing import Any, TextIO
 
 import tca_mj
-from tca_mj.cli import check, learn, log, model, own, play
+from tca_mj.cli import check, design, learn, log, model, own, play
 from tca_mj.cli.arguments import POLICIES, filled
 from tca_mj.cli.play import outcome, speed_table
 from tca_mj.cli.signals import Signals
@@ -143,6 +143,6 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--version", action="version", version=f"tca-mj {tca_mj.__version__}")
     commands = parser.add_subparsers(title="commands", required=True, metavar="COMMAND")
-    for part in (play, learn, model, check, own, log):
+    for part in (play, learn, model, check, own, log, design):
         part.add_commands(commands)
     return parser
