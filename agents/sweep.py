@@ -30,6 +30,7 @@ from tca_mj.files import claimed, write_whole
 from tca_mj.machine import machine, versions
 from tca_mj.pages import table
 from tca_mj.registry import ALGORITHMS
+from tca_mj.tca import find_tca
 
 TRIALS, RESULT = "trials", "result.json"
 TABLE, PAGE, FIGURE, ABOUT = "results.csv", "results.md", "results.png", "sweep.json"
@@ -53,7 +54,8 @@ class Sweep(Checked):
             settings.
         algorithm: Whether a policy is trained first, and how: one of
             ``tca_mj.registry.ALGORITHMS``. What is evaluated is then the best policy of the
-            run. Training is on the default robot.
+            run. Training is on the robot with its default figures, and with the muscle of
+            ``evaluation.arguments``, if that has one.
 
     Raises:
         ValueError: If a name is unknown, a value cannot be, an axis has no value or one twice, or
@@ -99,6 +101,11 @@ class Trial:
     def name(self) -> str:
         """Name of the folder: the same for the same settings, whatever else is swept."""
         about = repr((self.sweep.evaluation, self.sweep.algorithm, sorted(self.point.items())))
+        evaluation = self.sweep.evaluation
+        values = [v for n, v in self.point.items() if n.startswith("design.") or n == "train.tca"]
+        values += [*evaluation.arguments.values(), *evaluation.design.values()]
+        muscles = [find_tca(v) for v in map(str, values) if v.endswith(".json")]
+        about += "".join(map(repr, muscles))  # a file is what it holds
         return hashlib.sha256(about.encode()).hexdigest()[:12]
 
     def evaluation(self, folder: Path) -> Evaluation:
@@ -128,18 +135,20 @@ class Trial:
         task, algorithm = self.evaluation(Path()).task, self.sweep.algorithm
         if algorithm is None:
             return None
+        tca = self.sweep.evaluation.arguments.get("tca")
         given = [name for name in self.point if name.startswith("train.")]
         change: dict[str, Any] = {name[6:]: self.point[name] for name in given}
         try:
             if algorithm == "cma":
                 from tca_mj.agents.train.search import SearchConfig
 
-                return replace(SearchConfig(task=task), **change)
+                return replace(SearchConfig(task=task, tca=tca), **change)
             from tca_mj.agents.train.config import default_config
 
             learner = [name for name in change if name.startswith("learner.")]
             inner: dict[str, Any] = {name[8:]: change.pop(name) for name in learner}
-            config = default_config(task, algorithm, **change)
+            muscle = {} if tca is None else {"tca": tca}
+            config = default_config(task, algorithm, arguments=muscle, **change)
             return replace(config, learner=replace(config.learner, **inner))
         except TypeError as error:  # no such field
             raise ValueError(f"train: {error}") from error

@@ -12,8 +12,13 @@ import pytest
 import tca_mj
 from tca_mj import cli
 from tca_mj.agents import Evaluation, designed
+from tca_mj.agents.model import Transitions, collect
 from tca_mj.agents.policies import contract, differences, load_policy
+from tca_mj.agents.sweep import Sweep
 from tca_mj.agents.train.config import default_config
+from tca_mj.certify import SUBJECTS
+from tca_mj.certify.outcomes import Effort
+from tca_mj.certify.report import certify
 from tca_mj.modules.bending import silicone_cylinder
 from tca_mj.registry import TASKS, task_class
 from tca_mj.tca import (
@@ -357,3 +362,107 @@ def test_what_a_file_holds_tells_evaluations_apart(mine):
 def test_a_hanging_weight_says_what_the_file_says(mine):
     odd, path = mine
     assert hanging_length(read_tca(path).spec, 90.0, 0.2) == hanging_length(odd, 90.0, 0.2)
+
+
+SHORT = {"steps": 40, "population": 5, "episodes": 1, "settling": 0.0, "window": 1.0,
+         "validation_episodes": 1, "validate_every": 1}  # fmt: skip
+
+
+@pytest.mark.usefixtures("without_board")
+def test_a_search_for_a_gait_has_the_muscle(mine, tmp_path, monkeypatch):
+    """Its policy says so; it is refused on the robot's own, and the run does not go on with what
+    the file holds by then."""
+    searching = pytest.importorskip("tca_mj.agents.train.search")
+    odd, path = mine
+    walk, asked = "TCA/TetrapodWalk-v0", []
+    real = searching.run_trial
+
+    def noted(trial):
+        asked.append(trial.tca)
+        return real(trial)
+
+    monkeypatch.setattr(searching, "run_trial", noted)
+    config = searching.SearchConfig(task=walk, tca=str(path), **SHORT)
+    found = searching.search(config, tmp_path / "run", workers=1, progress=False)
+    assert asked and set(asked) == {odd}
+    assert found.arguments == {"action": "power", "tca": str(path)}
+    assert found.made_for["robot"]["leg.tca.coil_radius"] == odd.coil_radius
+    assert load_policy(tmp_path / "run", tca_mj.make(walk, tca=odd, action="power"))
+    with pytest.raises(ValueError, match=r"robot: .*'leg.tca.coil_radius' 0.00037"):
+        load_policy(tmp_path / "run", tca_mj.make(walk, action="power"))
+    with pytest.raises(ValueError, match="holds a run with tca .*mine.json"):
+        searching.search(replace(config, tca=None), tmp_path / "run", progress=False)
+    write_tca(path, replace(odd, heat_loss=0.2))
+    with pytest.raises(ValueError, match="run in another task, robot: 'leg.tca.heat_loss' 0.1013"):
+        searching.search(config, tmp_path / "run", progress=False)
+
+
+def test_the_commands_of_training_pass_the_muscle_on(mine, tmp_path, monkeypatch, capsys):
+    searching = pytest.importorskip("tca_mj.agents.train.search")
+    sweeping = pytest.importorskip("tca_mj.agents.sweep")
+    odd, path = mine
+    walk, asked = "TCA/TetrapodWalk-v0", []
+    monkeypatch.setattr(searching, "search", lambda config, *_, **__: asked.append(config.tca))
+    command = ["train", walk, "--algo", "cma", "--tca", str(path), "--out", str(tmp_path / "a")]
+    assert cli.main(command) == 0 and asked == [str(path)]
+    assert cli.main([*command, "--control-period", "0.2"]) == 2
+    assert "--action and --control-period are not for --algo cma" in capsys.readouterr().err
+
+    swept = []
+    monkeypatch.setattr(sweeping, "run_sweep", lambda sweep, *_, **__: swept.append(sweep) or [])
+    for algorithm, task in (("cma", walk), ("sac", REACH)):
+        more = ["--algo", algorithm, "--tca", str(path), "--out", str(tmp_path)]
+        (tmp_path / "results.md").write_text("")
+        assert cli.main(["sweep", "--task", task, *more]) == 0
+        (trial,) = swept[-1].trials()
+        config, evaluation = trial.config(), trial.evaluation(tmp_path)
+        own = config.tca if algorithm == "cma" else config.arguments["tca"]
+        assert own == evaluation.arguments["tca"] == str(path)
+    assert cli.main(["sweep", "--task", REACH, *more, "--action", "power"]) == 2
+    assert "said of POLICY, not with --algo" in capsys.readouterr().err
+
+
+def test_a_sweep_tells_files_apart_by_what_they_hold(mine):
+    odd, path = mine
+
+    def names(**more):
+        sweep = Sweep(evaluation=Evaluation(task=REACH, policy="off", **more),
+                      axes={"design.tca": (str(path),)} if not more else {})  # fmt: skip
+        return [trial.name for trial in sweep.trials()]
+
+    kinds = [{}, {"arguments": {"tca": str(path)}}, {"design": {"tca": str(path)}}]
+    before = [names(**kind) for kind in kinds]
+    assert before == [names(**kind) for kind in kinds]
+    write_tca(path, replace(odd, heat_loss=0.2))
+    assert all(names(**kind) != old for kind, old in zip(kinds, before, strict=True))
+
+
+def test_a_data_set_is_of_the_muscle(mine, tmp_path):
+    odd, path = mine
+    out = tmp_path / "steps.npz"
+    command = ["collect", REACH, "--episodes", "1", "--steps", "2", "--envs", "1"]
+    assert cli.main([*command, "--tca", str(path), "--out", str(out)]) == 0
+    found = Transitions.read(out)
+    assert found.arguments == {"tca": str(path)}
+    assert found.made_for["robot"]["tca.coil_radius"] == odd.coil_radius
+    with pytest.raises(ValueError, match=r"arguments\['tca'\] must be a text"):
+        collect(REACH, episodes=1, steps=1, arguments={"tca": odd})
+
+
+def test_a_module_is_certified_with_a_muscle(mine, tmp_path, capsys):
+    odd, path = mine
+    tcas = SUBJECTS["bending"](odd).tcas
+    assert {tca.coil_radius for tca in tcas} == {odd.coil_radius}
+    assert {tca.coil_radius for tca in SUBJECTS["arm"](odd).tcas} == {odd.coil_radius}
+    few = Effort(cases=2, finer=0, runs=1, solvers=1)
+    result = certify(["bending"], effort=few, workers=1, tca=path)
+    own = certify(["bending"], effort=few, workers=1)
+    assert f"With another muscle: {path}." in result["text"]
+    assert result["tca"]["coil_radius"] == odd.coil_radius and "tca" not in own
+    rows, owns = (each["modules"]["bending"] for each in (result, own))
+    assert [row["temperature"] for row in rows] == [row["temperature"] for row in owns]
+    assert all(row["gap"]["position"] < 0.01 and row["failure"] is None for row in rows)
+    assert [row["bend"] for row in rows] != [row["bend"] for row in owns]
+    write_tca(path, replace(odd, coil_radius=2e-3))
+    assert cli.main(["certify", "morphing", "--tca", str(path)]) == 2
+    assert "morphing cannot have this muscle: tca.outer_radius must" in capsys.readouterr().err

@@ -234,7 +234,7 @@ def collect(
         hottest: Temperature of a TCA beyond which an episode is cut off; None for the task's
             ``hot_temperature`` [°C].
         options: Options of every reset.
-        arguments: Of the task, besides those that the policies need.
+        arguments: Of the task, besides those that the policies need; ``tca`` as a name or a file.
         envs: Tasks that run side by side.
         threads: Threads of their simulations; None for one for each core.
         progress: Whether to show how far it is.
@@ -246,6 +246,8 @@ def collect(
     """
     within("policies", [len(policies)], at_least=1.0)
     given: dict[str, Any] = dict(arguments or {})
+    if given.get("tca") is not None:
+        text("arguments['tca']", given["tca"])  # to be found again
     for name in policies:
         given |= {k: v for k, v in arguments_of(text("policies", name), task).items()
                   if given.get(k) is None}  # fmt: skip

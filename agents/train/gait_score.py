@@ -13,6 +13,7 @@ from tca_mj.agents.policies.gait import GaitPolicy
 from tca_mj.agents.rollout import rollout
 from tca_mj.checks import Checked, Positive
 from tca_mj.control import Gait
+from tca_mj.tca import TcaSpec
 
 # Where penalties begin, somewhat within what is demanded of a gait, and how much they cost. The
 # demands: no more energy per metre than the scripted gait, a drift below 20 %, at most 180 °C and
@@ -38,6 +39,7 @@ class Trial:
         settling: Time that is not judged, in which the TCAs become warm; rounded to whole cycles
             [s].
         window: Time that is judged, rounded to whole cycles, at least one [s].
+        tca: The robot's muscle; None for its own.
     """
 
     task: str
@@ -47,6 +49,7 @@ class Trial:
     options: Mapping[str, float]
     settling: float
     window: float
+    tca: TcaSpec | None = None
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -74,7 +77,7 @@ class Headway:
 
 def run_trial(trial: Trial) -> Headway:
     """Runs an episode. What comes out depends on ``trial`` alone."""
-    env = _env(trial.task)
+    env = walking(trial.task, trial.tca)
     policy = GaitPolicy.in_task(env, trial.gait, trial.steering)
     period, tcas = policy.control_period, np.size(policy.heat.capacity)
     cycle = trial.gait.period / period
@@ -100,8 +103,9 @@ def run_trial(trial: Trial) -> Headway:
 
 
 @functools.cache  # one in each process
-def _env(task: str) -> gym.Env[Any, Any]:
-    return gym.make(task, disable_env_checker=True, action="power")
+def walking(task: str, tca: TcaSpec | None) -> gym.Env[Any, Any]:
+    """The environment of a trial's task with a muscle; None for the robot's own."""
+    return gym.make(task, disable_env_checker=True, action="power", tca=tca)
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)

@@ -23,9 +23,17 @@ from tca_mj.agents.cluster import ClusterWorkers
 from tca_mj.agents.output import write_csv
 from tca_mj.agents.policies import SavedPolicy
 from tca_mj.agents.policies.actors import TROT, first_gait
+from tca_mj.agents.policies.contracts import contract, differences
 from tca_mj.agents.progress import progress_bar
 from tca_mj.agents.train.config import Few, LearnerSeed, Many, Steps
-from tca_mj.agents.train.gait_score import Headway, Reference, Trial, run_trial, score
+from tca_mj.agents.train.gait_score import (
+    Headway,
+    Reference,
+    Trial,
+    run_trial,
+    score,
+    walking,
+)
 from tca_mj.agents.train.gait_space import GaitSpace
 from tca_mj.agents.train.runs import CURVE, RunFolder, drawn
 from tca_mj.agents.workers import Processes, Workers
@@ -33,6 +41,7 @@ from tca_mj.checks import Checked, door, number, whole
 from tca_mj.control import Gait
 from tca_mj.files import claimed
 from tca_mj.registry import task_class
+from tca_mj.tca import TcaSpec, find_tca
 
 BEST, LAST = "best.json", "last.json"
 
@@ -55,6 +64,7 @@ class SearchConfig(Checked):
         population: Gaits per generation, 5 to 10 000.
         episodes: Episodes per gait, the same for all of a generation, up to 10 000.
         options: Options of every episode; a robot of its own has ``randomise`` 0 and its numbers.
+        tca: The robot's muscle, a file or a name in ``tca_mj.CATALOGUE``; None for its own.
         settling: Time of each episode that is not judged, as in ``Trial`` [s].
         window: Time that is judged [s].
         validate_every: Generations after which the middle of the search is judged, by the same
@@ -77,6 +87,7 @@ class SearchConfig(Checked):
     window: Annotated[float, partial(number, at_least=0.1, at_most=25.0, unit="s")] = 20.0
     validate_every: Many = 8
     validation_episodes: Few = 8
+    tca: str | None = None
 
     def __post_init__(self) -> None:
         Checked.__post_init__(self)
@@ -131,11 +142,14 @@ def search(
     Raises:
         ImportError, ConnectionError: If Ray is not installed, or there is no cluster at
             ``address``.
-        FileNotFoundError, ValueError: If the settings do not fit, or not to the run in ``out``.
+        FileNotFoundError, ValueError: If the settings do not fit, or not to the run in ``out``; a
+            muscle's file is what it holds.
         BlockingIOError: If another process works in ``out``.
         OSError: If something cannot be written.
         KeyboardInterrupt: As it came, after everything was written.
     """
+    tca = None if config.tca is None else find_tca(config.tca)
+    made_for = _relied_on(config.task, tca)
     gait, steering = first_gait(config.task, config.start)
     space = GaitSpace(centre=gait, hottest=task_class(config.task).hot_temperature)
     point = space.encode(gait, steering)
@@ -145,12 +159,14 @@ def search(
     with ExitStack() as ends:
         ends.enter_context(claimed(out))
         folder = RunFolder(out, config, command)
-        state, known = folder.load() or (SearchState(optimiser=optimiser), {})
+        state, known, *noted = folder.load() or (SearchState(optimiser=optimiser), {})
+        if apart := differences(noted[0], made_for) if noted else []:
+            raise ValueError(f"{out} holds a run in another task, {' | '.join(apart)}")
         board = folder.tensorboard(int(state.rows[-1]["steps"]) if state.rows else 0)
         ends.callback(board.close)
         bar = progress_bar(config.steps, unit="steps", done=state.steps, progress=progress)
         ends.callback(bar.close)
-        run = _Search(config, folder, space, point, state, known, board)
+        run = _Search(config, folder, space, point, state, known, board, tca, made_for)
         ends.callback(run.save)
         if address is None:
             run.processes = ends.enter_context(Workers(workers))
@@ -179,6 +195,8 @@ class _Search:
         state: Where it stands, replaced as a whole.
         known: Episodes that are finished of a step of the search that is not.
         board: TensorBoard's.
+        tca: The robot's muscle; None for its own.
+        made_for: What its gaits rely on, parts of a contract.
         processes: Who runs episodes.
     """
 
@@ -189,6 +207,8 @@ class _Search:
     state: SearchState
     known: dict[tuple[str, int], Headway]
     board: Any
+    tca: TcaSpec | None
+    made_for: dict[str, Any]
     processes: Workers | ClusterWorkers = field(init=False)
 
     def __post_init__(self) -> None:
@@ -272,6 +292,7 @@ class _Search:
             Trial(
                 task=config.task, gait=gait, steering=steering, seed=seed,
                 options=config.options, settling=config.settling, window=config.window,
+                tca=self.tca,
             )
             for gait, steering in gaits
             for seed in seeds
@@ -311,14 +332,24 @@ class _Search:
         gait, steering = self.space.decode(point)
         source = f"CMA-ES from the gait '{config.start}', generation {state.generation}"
         origin = self.folder.origin("cma", state.steps, source)
-        return SavedPolicy(task=config.task, origin=origin, gait=gait, steering=steering)
+        muscle = {} if config.tca is None else {"tca": config.tca}
+        return SavedPolicy(
+            task=config.task, origin=origin, gait=gait, steering=steering,
+            arguments={"action": "power", **muscle}, made_for=self.made_for,
+        )  # fmt: skip
 
     def save(self) -> None:
         """Writes the state, then what follows from it."""
-        self.folder.save((self.state, self.known))
+        self.folder.save((self.state, self.known, self.made_for))
         write_csv(self.folder.path / CURVE, self.state.rows)
         self.policy(best=True).save(self.folder.path / BEST)
         self.policy(best=False).save(self.folder.path / LAST)
+
+
+def _relied_on(task: str, tca: TcaSpec | None) -> dict[str, Any]:
+    """What a gait relies on of its task: not on what else is seen."""
+    found = contract(walking(task, tca))
+    return {name: part for name, part in found.items() if name != "observation"}
 
 
 def _steps(found: Found) -> int:

@@ -28,6 +28,7 @@ from tca_mj.certify.subjects import SUBJECTS, Subject
 from tca_mj.model import NotSettledError
 from tca_mj.rod import RodSolveError
 from tca_mj.sim import SimulationDiverged
+from tca_mj.tca import TcaSpec
 
 POSITION, ROTATION = 0.01, np.radians(2.0)  # what a default number of nodes is allowed
 TIMES = (1, 2, 4)  # multiples of the default nodes by which the order is measured
@@ -167,7 +168,7 @@ def _shear(subject: Subject, case: Case, exact: Rest) -> Gap | None:
 
 def outcomes(
     names: Sequence[str], *, effort: Effort = FULL, seed: int = 0, workers: int = 1,
-    progress: Callable[[], Any] = lambda: None,
+    progress: Callable[[], Any] = lambda: None, tca: TcaSpec | None = None,
 ) -> dict[str, list[Outcome]]:  # fmt: skip
     """Answers the cases of some modules.
 
@@ -177,9 +178,10 @@ def outcomes(
         seed: Of the cases.
         workers: Processes that share the work; it has no influence on the outcomes.
         progress: Called after every case.
+        tca: The modules' muscle; None for their own.
     """
     tasks = [(name, number) for number in range(effort.cases) for name in names]
-    answer = partial(_one, effort=effort, seed=seed)
+    answer = partial(_one, effort=effort, seed=seed, tca=tca)
     found: dict[int, Outcome] = {}
     with Workers(workers) as processes:
         for number, outcome in processes.run(answer, [(task,) for task in tasks]):
@@ -189,7 +191,7 @@ def outcomes(
     return {name: [outcome for of, outcome in each if of == name] for name in names}
 
 
-def _one(task: tuple[str, int], effort: Effort, seed: int) -> Outcome:
+def _one(task: tuple[str, int], effort: Effort, seed: int, tca: TcaSpec | None) -> Outcome:
     name, number = task
-    subject = SUBJECTS[name]()
+    subject = SUBJECTS[name](tca)
     return judge(subject, draw(subject, name, number + 1, seed)[-1], number, effort)

@@ -19,6 +19,7 @@ from tca_mj.certify.claims import Claim, claims
 from tca_mj.certify.outcomes import FULL, POSITION, ROTATION, TIMES, Effort, Outcome, outcomes
 from tca_mj.certify.subjects import SUBJECTS
 from tca_mj.machine import machine, versions
+from tca_mj.tca import TcaSpec, find_tca
 from tca_mj.validation.figures import draw, need_matplotlib
 
 _NOTHING = 1e-6  # error below which there is no order to measure, and none is drawn [1, rad]
@@ -36,24 +37,28 @@ _FIGURES = {
 
 def certify(
     names: Sequence[str] = (), *, out: Path | None = None, effort: Effort = FULL, seed: int = 0,
-    workers: int | None = None,
+    workers: int | None = None, tca: TcaSpec | str | Path | None = None,
 ) -> dict[str, Any]:  # fmt: skip
     """Certifies modules, all of them within half an hour on two cores.
 
     Args:
-        names: Some of ``SUBJECTS``, by default all. Single claims are checked with all only.
+        names: Some of ``SUBJECTS``, by default all. Single claims, which are of the modules' own
+            muscles, are checked with all only.
         out: Folder for ``report.json``, ``report.md`` and the figures ``accuracy_*.png``; None to
             write nothing.
         effort: How many cases are drawn, and how many of them are looked at more closely.
         seed: Of the cases.
         workers: Processes that share the work, by default one per core.
+        tca: Their muscle, what ``find_tca`` finds; None for their own.
 
     Returns:
         ``machine``, ``versions``, ``effort``, ``seed``, ``seconds`` (that it took, and of
-        processors), ``modules`` (outcomes by name) and ``claims``, as dictionaries.
+        processors), ``modules`` (outcomes by name) and ``claims``, as dictionaries; with a muscle
+        ``tca``, its numbers.
 
     Raises:
-        ValueError: If there is no such module.
+        FileNotFoundError: If there is no such file of a muscle.
+        ValueError: If there is no such module or muscle, or a module cannot have it.
         ImportError: If ``out`` is given and Matplotlib is not installed.
     """
     unknown = sorted(set(names) - set(SUBJECTS))
@@ -62,11 +67,18 @@ def certify(
     if out is not None:
         need_matplotlib()
     asked = [name for name in SUBJECTS if name in names] if names else list(SUBJECTS)
+    muscle = None if tca is None else find_tca(tca)
+    for name in asked if muscle else ():
+        try:
+            SUBJECTS[name](muscle)
+        except ValueError as error:
+            raise ValueError(f"{name} cannot have this muscle: {error}") from error
     cores = int(machine()["cores"]) if workers is None else workers
     begin, busy = time.perf_counter(), time.process_time()
     with progress_bar(effort.cases * len(asked), unit="cases", leave=False) as bar:
-        rows = outcomes(asked, effort=effort, seed=seed, workers=cores, progress=bar.update)
-    single = [] if names else claims()
+        rows = outcomes(asked, effort=effort, seed=seed, workers=cores, progress=bar.update,
+                        tca=muscle)  # fmt: skip
+    single = [] if names or muscle else claims()
     processor = time.process_time() - busy
     if cores > 1:  # the processes' own
         processor += sum(row.seconds for each in rows.values() for row in each)
@@ -75,6 +87,7 @@ def certify(
         "seconds": {"wall": time.perf_counter() - begin, "processor": processor},
         "modules": {name: [asdict(row) for row in each] for name, each in rows.items()},
         "claims": [asdict(claim) for claim in single],
+        **({} if muscle is None else {"tca": asdict(muscle), "muscle": _named(tca)}),
     }  # fmt: skip
     if out is not None:
         out.mkdir(parents=True, exist_ok=True)
@@ -82,6 +95,11 @@ def certify(
     page = report(rows, single, result, pictures="")
     pages.write_result(out, "report", result, page, indent=1)
     return result | {"text": report(rows, single, result)}
+
+
+def _named(tca: TcaSpec | str | Path | None) -> str:
+    """What a report calls a muscle."""
+    return "one of one's own" if isinstance(tca, TcaSpec) else str(tca)
 
 
 def report(
@@ -102,6 +120,7 @@ def report(
              for name, caption in _FIGURES.items()}  # fmt: skip
     return pages.page(
         pages.made_with(result),
+        f"With another muscle: {result['muscle']}." if "muscle" in result else "",
         f"{result['effort']['cases']} cases per module, seed {result['seed']}:"
         f" {result['seconds']['processor']:.0f} s of processor time.",
         "## Modules at their default nodes", _table(rows), _remarks(rows), drawn["bend"],

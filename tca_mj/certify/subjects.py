@@ -34,7 +34,7 @@ from tca_mj.robots.arm import ArmSpec, arm
 from tca_mj.robots.morphing_grid import MorphingGridSpec, morphing_grid
 from tca_mj.rod import BeamSpec, Segment, StrandLaw
 from tca_mj.smp import HOLD_TEMPERATURE
-from tca_mj.tca import TcaSpec
+from tca_mj.tca import TcaSpec, with_tca
 
 # Axes of the fingers' bases in the mount, as columns: z to its +x or -x, x to its -z.
 _FINGERS = (
@@ -314,37 +314,48 @@ _SOFT: dict[str, Any] = {"force": 1e-2, "moment": 2e-4, "temperature": (25.0, 14
 _STIFF: dict[str, Any] = {"force": 0.147, "moment": 2e-3, "temperature": (25.0, 30.0)}
 _HANGS: dict[str, Any] = {"postures": ("hanging", "lying")}
 
-# What is certified, made when it is asked for, by name.
-SUBJECTS: Mapping[str, Callable[[], Subject]] = MappingProxyType({
-    "bending": lambda: _bending(BendingSpec()),
-    "twisting": lambda: _twisting(TwistingSpec()),
-    "twisting-single": lambda: _twisting(TwistingSpec(double=False, nodes=16)),
-    "innervated": lambda: _innervated(InnervatedFingerSpec()),
-    "finger": lambda: _finger(FingerPairSpec()),
-    "soft-finger": lambda: _soft_finger(SoftFingerSpec()),
-    "bistable-1": lambda: _bistable(BistableSpec(), 1),
-    "bistable-2": lambda: _bistable(BistableSpec(), 2),
-    "adaptive-gripper": lambda: _adaptive(AdaptiveGripperSpec(), _HALF),
-    "arm": lambda: _arm(ArmSpec()),
-    "morphing": lambda: _morphing(
-        morphing_module, MorphingSpec(motions=MOTIONS), "morphing module, soft",
-        **_SOFT, **_HANGS),
-    "morphing-cold": lambda: _morphing(
-        morphing_module, MorphingSpec(motions=MOTIONS), "morphing module, fixed at 180°",
+
+def _with(spec: Any, tca: TcaSpec | None) -> Any:
+    """A module's specification with a muscle; None for its own."""
+    return spec if tca is None else with_tca(spec, tca)
+
+
+# What is certified, made when it is asked for, by name; with a muscle in place of its own.
+SUBJECTS: Mapping[str, Callable[..., Subject]] = MappingProxyType({
+    "bending": lambda tca=None: _bending(_with(BendingSpec(), tca)),
+    "twisting": lambda tca=None: _twisting(_with(TwistingSpec(), tca)),
+    "twisting-single": lambda tca=None: _twisting(_with(TwistingSpec(double=False, nodes=16), tca)),
+    "innervated": lambda tca=None: _innervated(_with(InnervatedFingerSpec(), tca)),
+    "finger": lambda tca=None: _finger(_with(FingerPairSpec(), tca)),
+    "soft-finger": lambda tca=None: _soft_finger(_with(SoftFingerSpec(), tca)),
+    "bistable-1": lambda tca=None: _bistable(_with(BistableSpec(), tca), 1),
+    "bistable-2": lambda tca=None: _bistable(_with(BistableSpec(), tca), 2),
+    "adaptive-gripper": lambda tca=None: _adaptive(_with(AdaptiveGripperSpec(), tca), _HALF),
+    "arm": lambda tca=None: _arm(_with(ArmSpec(), tca)),
+    "morphing": lambda tca=None: _morphing(
+        morphing_module, _with(MorphingSpec(motions=MOTIONS), tca),
+        "morphing module, soft", **_SOFT, **_HANGS),
+    "morphing-cold": lambda tca=None: _morphing(
+        morphing_module, _with(MorphingSpec(motions=MOTIONS), tca),
+        "morphing module, fixed at 180°",
         (_HALF / MorphingSpec().spine.length, 0.0, 0.0), **_STIFF),
-    "morphing-twist": lambda: _morphing(
-        twist_morphing_module, TwistMorphingSpec(), "morphing module that twists, soft", **_SOFT),
-    "morphing-twist-cold": lambda: _morphing(
-        twist_morphing_module, TwistMorphingSpec(), "morphing module that twists, fixed at -90°",
+    "morphing-twist": lambda tca=None: _morphing(
+        twist_morphing_module, _with(TwistMorphingSpec(), tca),
+        "morphing module that twists, soft", **_SOFT),
+    "morphing-twist-cold": lambda tca=None: _morphing(
+        twist_morphing_module, _with(TwistMorphingSpec(), tca),
+        "morphing module that twists, fixed at -90°",
         (0.0, 0.0, -_QUARTER / TwistMorphingSpec().spine.length), **_STIFF),
-    "morphing-3d": lambda: _morphing(
-        morphing_3d_module, Morphing3dSpec(), "morphing module that bends to any side, soft",
-        **_SOFT, **_HANGS),
-    "morphing-3d-cold": lambda: _morphing(
-        morphing_3d_module, Morphing3dSpec(), "the same, fixed at 90° between two TCAs",
+    "morphing-3d": lambda tca=None: _morphing(
+        morphing_3d_module, _with(Morphing3dSpec(), tca),
+        "morphing module that bends to any side, soft", **_SOFT, **_HANGS),
+    "morphing-3d-cold": lambda tca=None: _morphing(
+        morphing_3d_module, _with(Morphing3dSpec(), tca),
+        "the same, fixed at 90° between two TCAs",
         (-math.sin(_ACROSS) * _QUARTER / Morphing3dSpec().spine.length,
          math.cos(_ACROSS) * _QUARTER / Morphing3dSpec().spine.length, 0.0), **_STIFF),
-    "grid-member": lambda: _grid_member(
-        MorphingGridSpec(rows=1, columns=2, member=replace(
-            MorphingGridSpec().member, motions=MOTIONS)), "grid of a single member, soft", **_SOFT),
+    "grid-member": lambda tca=None: _grid_member(
+        _with(MorphingGridSpec(rows=1, columns=2, member=replace(
+            MorphingGridSpec().member, motions=MOTIONS)), tca),
+        "grid of a single member, soft", **_SOFT),
 })  # fmt: skip

@@ -31,6 +31,8 @@ def add_commands(commands: Commands) -> None:
         " modules", nargs="*")  # fmt: skip
     add(certify, "--out", "folder; default: write nothing")
     add(certify, "--seed", "of the modules' cases; default 0")
+    add(certify, "--tca", "the modules' muscle, or argument of the function: a file or a name in"
+        " tca_mj.CATALOGUE; default: their own")  # fmt: skip
     above_0 = partial(parse_number, above=0.0)
     robot = certify.add_argument_group("of a robot that module:function builds")
     add(robot, "--hot", "temperature of a hot TCA, or one for each; default 120", type=parse_number,
@@ -40,7 +42,6 @@ def add_commands(commands: Commands) -> None:
     add(robot, "--spine", "temperature at which its shape-memory spines stay", type=parse_number,
         metavar="CELSIUS")  # fmt: skip
     add(robot, "--nodes", "argument of the function; default: its own")
-    add(robot, "--tca", "argument of the function, a muscle: a file or a name in tca_mj.CATALOGUE")
     add(robot, "--tolerance", "of the tip, in %% of the length; default 1", type=above_0,
         metavar="PERCENT")  # fmt: skip
     add(robot, "--angle", "tolerance of the tip's frame; default 2", type=above_0,
@@ -117,18 +118,22 @@ def _certify(arguments: argparse.Namespace) -> int:
 
     examples:
       tca-mj certify bending arm --out runs/certificate
+      tca-mj certify bending --tca mine.json
       tca-mj certify my_robots:two_modules --hot 100 --gravity 0 0 9.81
     """
     robots = [name for name in arguments.module if ":" in name]
     if robots:
         return _certify_robots(robots, arguments)
-    named = ("hot", "gravity", "spine", "nodes", "tca", "tolerance", "angle")
+    named = ("hot", "gravity", "spine", "nodes", "tolerance", "angle")
     given = [f"--{name}" for name in named if getattr(arguments, name) is not None]
     if given:
         raise ValueError(f"{given[0]} is for a robot, module:function")
     from tca_mj.certify.report import certify
 
-    result = certify(arguments.module, out=arguments.out, seed=arguments.seed)
+    result = certify(
+        arguments.module, out=arguments.out, seed=arguments.seed, tca=arguments.tca,
+        **({} if arguments.workers is None else {"workers": arguments.workers}),
+    )  # fmt: skip
     _show(result["text"], arguments.out, "report")
     return 0
 

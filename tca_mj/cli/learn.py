@@ -53,7 +53,7 @@ def add_commands(commands: Commands) -> None:
         choices=("temperature", "power"))  # fmt: skip
     add(train, "--control-period", "time of a step [s]; default: by task", type=parse_seconds,
         metavar="SECONDS")  # fmt: skip
-    add(train, "--tca", "the robot's muscle: a file or a name in tca_mj.CATALOGUE; not of cma")
+    add(train, "--tca", "the robot's muscle: a file or a name in tca_mj.CATALOGUE")
     some = train.add_mutually_exclusive_group()
     add(some, "--seed", "default 0")
     add(some, "--seeds", "runs with seeds 0 to K-1, into OUT/seed_0, ...", metavar="K")
@@ -163,8 +163,8 @@ def _train(arguments: argparse.Namespace) -> int:
     command, cma = _command(arguments), algorithm == "cma"
     how = ("action", "control_period", "tca")
     asked = {name: getattr(arguments, name) for name in how if getattr(arguments, name) is not None}
-    if cma and asked:
-        raise ValueError("--action, --control-period and --tca are not for --algo cma")
+    if cma and asked.keys() - {"tca"}:
+        raise ValueError("--action and --control-period are not for --algo cma")
     if arguments.address is not None and not cma:
         raise ValueError("--address is for --algo cma; many trainings at once are a sweep's")
     for seed in several or [arguments.seed]:
@@ -175,7 +175,7 @@ def _train(arguments: argparse.Namespace) -> int:
             if getattr(arguments, option) is not None:
                 given[option] = getattr(arguments, option)
         if cma:
-            config = searching.SearchConfig(task=arguments.task, **given)
+            config = searching.SearchConfig(task=arguments.task, tca=arguments.tca, **given)
             config = replace(config, options={**config.options, **dict(arguments.options)})
             searching.search(
                 config, out, workers=arguments.workers, command=command, address=arguments.address
@@ -243,7 +243,8 @@ def _sweep(arguments: argparse.Namespace) -> int:
     if (arguments.policy is None) == (arguments.algo is None):
         raise ValueError("give POLICY or --algo")
     how = how_made(arguments)
-    if arguments.algo and how != {"arguments": {}, "preprocessing": Preprocessing()}:
+    untold = how["preprocessing"] == Preprocessing() and not how["arguments"].keys() - {"tca"}
+    if arguments.algo and not untold:
         raise ValueError("how a model was trained is said of POLICY, not with --algo")
     evaluation = Evaluation(
         task=arguments.tasks[0], policy=arguments.policy or "off", episodes=arguments.episodes,

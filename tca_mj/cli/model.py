@@ -35,6 +35,8 @@ def add_commands(commands: Commands) -> None:
         choices=("temperature", "power"))  # fmt: skip
     add(collect, "--control-period", "time of a step [s]; default: by task", type=parse_seconds,
         metavar="SECONDS")  # fmt: skip
+    add(collect, "--tca", "the robot's muscle: a file or a name in tca_mj.CATALOGUE; default: the"
+        " robot's own")  # fmt: skip
     add(collect, "--envs", "tasks side by side; default 8", default=8)
 
     fit = add_command(commands, "fit", _fit, help="fit a model to a data set", extra="rl")
@@ -69,7 +71,7 @@ def _collect(arguments: argparse.Namespace) -> int:
     """
     from tca_mj.agents.model import collect
 
-    how = {"action": arguments.action, "control_period": arguments.control_period}
+    how = {name: getattr(arguments, name) for name in ("action", "control_period", "tca")}
     found = collect(
         arguments.task, episodes=arguments.episodes, steps=arguments.steps, seed=arguments.seed,
         policies=tuple(arguments.policies or ("off",)), hottest=arguments.hottest,
