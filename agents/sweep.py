@@ -51,11 +51,12 @@ class Sweep(Checked):
         axes: Values by name; all combinations are run. Names are fields of ``Evaluation`` (its task
             too), ``design.PATH`` for a figure of the robot (see ``tca_mj.agents.design.robot_of``),
             and with an algorithm ``train.FIELD`` or ``train.learner.FIELD`` of the training's
-            settings.
+            settings. ``train.design.PATH`` is a figure of the robot that is trained and evaluated,
+            ``design.PATH`` of the one that is only evaluated.
         algorithm: Whether a policy is trained first, and how: one of
             ``tca_mj.registry.ALGORITHMS``. What is evaluated is then the best policy of the
-            run. Training is on the robot with its default figures, and with the muscle of
-            ``evaluation.arguments``, if that has one.
+            run. Training is on the robot with its default figures, but for ``train.design.PATH``,
+            and with the muscle of ``evaluation.arguments``, if that has one.
 
     Raises:
         ValueError: If a name is unknown, a value cannot be, an axis has no value or one twice, or
@@ -102,7 +103,8 @@ class Trial:
         """Name of the folder: the same for the same settings, whatever else is swept."""
         about = repr((self.sweep.evaluation, self.sweep.algorithm, sorted(self.point.items())))
         evaluation = self.sweep.evaluation
-        values = [v for n, v in self.point.items() if n.startswith("design.") or n == "train.tca"]
+        robots = ("design.", "train.design.")  # whose muscle may be a file
+        values = [v for n, v in self.point.items() if n.startswith(robots) or n == "train.tca"]
         values += [*evaluation.arguments.values(), *evaluation.design.values()]
         muscles = [find_tca(v) for v in map(str, values) if v.endswith(".json")]
         about += "".join(map(repr, muscles))  # a file is what it holds
@@ -116,7 +118,8 @@ class Trial:
         design = dict(self.sweep.evaluation.design)
         change: dict[str, Any] = {}
         for name, value in self.point.items():
-            head, _, rest = name.partition(".")
+            trained = self.sweep.algorithm and name.startswith("train.design.")
+            head, _, rest = (name.removeprefix("train.") if trained else name).partition(".")
             if head == "design" and rest:
                 design[rest] = value
             elif name in known and not (name == "policy" and self.sweep.algorithm):
@@ -138,6 +141,9 @@ class Trial:
         tca = self.sweep.evaluation.arguments.get("tca")
         given = [name for name in self.point if name.startswith("train.")]
         change: dict[str, Any] = {name[6:]: self.point[name] for name in given}
+        paths = [name for name in change if name.startswith("design.")]
+        if paths:
+            change["design"] = {name[7:]: change.pop(name) for name in paths}
         try:
             if algorithm == "cma":
                 from tca_mj.agents.train.search import SearchConfig

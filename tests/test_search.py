@@ -189,6 +189,26 @@ def test_a_search_that_is_stopped_anywhere_goes_on_with_nothing_lost(monkeypatch
     assert (tmp_path / "parts" / "curve.csv").read_bytes() == curve
 
 
+def test_a_gait_is_searched_for_the_robot_of_a_design(monkeypatch, tmp_path):
+    """Every episode is walked by that robot, the gait says so, and no other run goes on with it."""
+    asked = []
+
+    class Noted(Model):
+        def run(self, function, jobs):
+            asked.extend(job.robot for (job,) in jobs)
+            return super().run(function, jobs)
+
+    monkeypatch.setattr(searching, "Workers", Noted())
+    config = replace(TINY, steps=1, design={"leg.length": 0.06})
+    found = search(config, tmp_path, progress=False)
+    assert found.made_for["robot"]["leg.length"] == 0.06
+    assert {robot["robot"].leg.length for robot in asked} == {0.06}
+    with pytest.raises(ValueError, match="design"):
+        search(replace(config, design={}), tmp_path, progress=False)
+    with pytest.raises(ValueError, match="did you mean 'length'"):
+        replace(TINY, design={"leg.lenght": 0.06})
+
+
 def test_tensorboard_has_every_point_once(monkeypatch, tmp_path):
     found = None
     for stop in range(20, 200, 20):

@@ -17,7 +17,7 @@ from tca_mj.agents import sweep as module
 from tca_mj.agents.design import designed, robot_of
 from tca_mj.agents.evaluate import Evaluation
 from tca_mj.agents.finished import EPISODES
-from tca_mj.agents.policies import SavedPolicy, shipped
+from tca_mj.agents.policies import SavedPolicy, contract, shipped
 from tca_mj.agents.sweep import TRIALS, Sweep, run_sweep
 from tca_mj.robots.tetrapod import TetrapodSpec
 from tca_mj.tca import CATALOGUE
@@ -131,6 +131,26 @@ def test_settings_of_a_training_reach_it():
     assert config.learner.gamma == 0.9 and config.steps == 1000 and config.task == REACH
 
 
+def test_a_robot_and_what_moves_it_are_designed_together(tmp_path, monkeypatch):
+    """Each length gets a training of its own, on that robot, and is evaluated on it."""
+    pytest.importorskip("stable_baselines3")
+    monkeypatch.setattr(module, "_tune", one_by_one)
+    sweep = Sweep(evaluation=SHORT, algorithm="sac", axes={
+        "train.design.length": (0.045, 0.05), "train.steps": (16,), "train.interval": (16,),
+        "train.evaluation_episodes": (1,), "train.learner.learning_starts": (8,),
+    })  # fmt: skip
+    run_sweep(sweep, tmp_path)
+    for trial, length in zip(sweep.trials(), (0.045, 0.05), strict=True):
+        folder = tmp_path / TRIALS / trial.name
+        policy = SavedPolicy.read(folder / "best.npz")
+        assert policy.made_for["robot"]["length"] == length
+        assert contract(trial.evaluation(folder).make())["robot"]["length"] == length
+    assert len({trial.name for trial in sweep.trials()}) == 2
+    aside = Sweep(evaluation=SHORT, algorithm="sac", axes={"design.length": (0.05,)})
+    (trial,) = aside.trials()
+    assert trial.config().design == {} and trial.evaluation(tmp_path).design == {"length": 0.05}
+
+
 @pytest.mark.parametrize(
     ("change", "message"),
     [
@@ -142,6 +162,8 @@ def test_settings_of_a_training_reach_it():
         ({"axes": {}, "algorithm": "luck"}, "algorithm must be one of .* got 'luck'"),
         ({"axes": {"train.size": (1,)}, "algorithm": "sac"}, "change must be one of .* got 'size'"),
         ({"axes": {"policy": ("off",)}, "algorithm": "sac"}, "'policy' must be"),
+        ({"axes": {"train.design.length": (0.05,)}}, "'train.design.length' must be design.PATH"),
+        ({"axes": {"train.design.legnth": (0.05,)}, "algorithm": "sac"}, "did you mean 'length'"),
     ],
 )
 def test_bad_sweeps_are_refused(change, message):

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, fields, replace
 from functools import partial
 from typing import Annotated, Any
 
+from tca_mj.agents.design import robot_of
 from tca_mj.checks import Checked, Positive, Share, door, number, require_one_of, shown, whole
 from tca_mj.envs.recipe import Recipe
 from tca_mj.registry import DEEP, Envs, recipes, task_class
@@ -125,6 +126,8 @@ class TrainConfig(Checked):
         envs: Environments that are stepped together, up to 1024.
         options: Options of every reset, in training and in evaluation.
         arguments: What the task is made with: ``action``, ``control_period``, ``tca``.
+        design: Figures of the robot that differ from the default, see
+            ``tca_mj.agents.design.robot_of``.
         timestep: Physics time step in training; None for the task's own, which evaluations have in
             any case [s].
         scaled: Whether observations are scaled by the task's table; otherwise they and the rewards
@@ -155,6 +158,7 @@ class TrainConfig(Checked):
     envs: Envs = 8
     options: Mapping[str, float] = field(default_factory=dict)
     arguments: Mapping[str, Any] = field(default_factory=dict)
+    design: Mapping[str, Any] = field(default_factory=dict)
     timestep: Positive | None = None
     scaled: bool = False
     mirrored: bool = False
@@ -185,6 +189,8 @@ class TrainConfig(Checked):
                 "arguments['tca'] must be a name or a file, to be found again when a run goes on,"
                 f" got {shown(self.arguments['tca'])}"
             )
+        if self.design:
+            robot_of(self.task, self.design)
         for name in self.growth:
             require_one_of("growth", name, list(self.options))
         if self.residual and not task.legs:
@@ -209,6 +215,12 @@ class TrainConfig(Checked):
                 "arguments['action'] must be 'power' where a gait is corrected, got"
                 f" {shown(self.arguments)}"
             )
+
+    @property
+    def made_with(self) -> dict[str, Any]:
+        """What the task is made with: ``arguments``, and the robot of ``design``."""
+        robot = robot_of(self.task, self.design) if self.design else {}
+        return {**self.arguments, **robot}
 
 
 @door

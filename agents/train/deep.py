@@ -124,7 +124,7 @@ def film(config: TrainConfig, out: Path) -> None:
 
 def record(config: TrainConfig, out: Path, policy: SavedPolicy, *, video: bool = False) -> None:
     """Records an episode of a policy as the best; its files are replaced when they are whole."""
-    env: gym.Env[Any, Any] = make(config.task, **config.arguments)
+    env: gym.Env[Any, Any] = make(config.task, **config.made_with)
     part = out / f".{BEST}{PART}"
     try:
         episode = Episode(
@@ -164,7 +164,7 @@ class Run:
         coarser = {} if config.timestep is None else {"timestep": config.timestep}
         tasks = TaskVecEnv.make(
             config.task, config.envs, reset_options=dict(config.options), scaled=config.scaled,
-            **config.arguments, **coarser,
+            **config.made_with, **coarser,
         )  # fmt: skip
         self.env = LearningEnv(tasks, self._gait, config.residual)
         if state is None:
@@ -185,7 +185,7 @@ class Run:
                 self.model.replay_buffer = pickle.loads(state["replay"])  # type: ignore[attr-defined]
             _set_generators(self.model, state["generators"])
         silence(self.model)
-        self.test_env: gym.Env[Any, Any] = make(config.task, **config.arguments)
+        self.test_env: gym.Env[Any, Any] = make(config.task, **config.made_with)
         task: Any = self.test_env.unwrapped
         self._units = task.observation.units if config.scaled else None
         self._made_for = contract(self.test_env)

@@ -2,7 +2,7 @@
 
 import functools
 from collections.abc import Mapping, Sequence
-from dataclasses import astuple, dataclass
+from dataclasses import astuple, dataclass, field
 from itertools import islice
 from typing import Any
 
@@ -13,7 +13,6 @@ from tca_mj.agents.policies.gait import GaitPolicy
 from tca_mj.agents.rollout import rollout
 from tca_mj.checks import Checked, Positive
 from tca_mj.control import Gait
-from tca_mj.tca import TcaSpec
 
 # Where penalties begin, somewhat within what is demanded of a gait, and how much they cost. The
 # demands: no more energy per metre than the scripted gait, a drift below 20 %, at most 180 °C and
@@ -39,7 +38,7 @@ class Trial:
         settling: Time that is not judged, in which the TCAs become warm; rounded to whole cycles
             [s].
         window: Time that is judged, rounded to whole cycles, at least one [s].
-        tca: The robot's muscle; None for its own.
+        robot: What its task is made with besides: the robot's muscle, another robot.
     """
 
     task: str
@@ -49,7 +48,7 @@ class Trial:
     options: Mapping[str, float]
     settling: float
     window: float
-    tca: TcaSpec | None = None
+    robot: Mapping[str, Any] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -77,7 +76,7 @@ class Headway:
 
 def run_trial(trial: Trial) -> Headway:
     """Runs an episode. What comes out depends on ``trial`` alone."""
-    env = walking(trial.task, trial.tca)
+    env = walking(trial.task, **trial.robot)
     policy = GaitPolicy.in_task(env, trial.gait, trial.steering)
     period, tcas = policy.control_period, np.size(policy.heat.capacity)
     cycle = trial.gait.period / period
@@ -103,9 +102,9 @@ def run_trial(trial: Trial) -> Headway:
 
 
 @functools.cache  # one in each process
-def walking(task: str, tca: TcaSpec | None) -> gym.Env[Any, Any]:
-    """The environment of a trial's task with a muscle; None for the robot's own."""
-    return gym.make(task, disable_env_checker=True, action="power", tca=tca)
+def walking(task: str, **robot: Any) -> gym.Env[Any, Any]:
+    """The environment of a trial's task, made with a muscle or another robot, too."""
+    return gym.make(task, disable_env_checker=True, action="power", **robot)
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)

@@ -20,6 +20,7 @@ from cmaes import CMA
 from numpy.typing import NDArray
 
 from tca_mj.agents.cluster import ClusterWorkers
+from tca_mj.agents.design import robot_of
 from tca_mj.agents.output import write_csv
 from tca_mj.agents.policies import SavedPolicy
 from tca_mj.agents.policies.actors import TROT, first_gait
@@ -41,7 +42,7 @@ from tca_mj.checks import Checked, door, number, whole
 from tca_mj.control import Gait
 from tca_mj.files import claimed
 from tca_mj.registry import task_class
-from tca_mj.tca import TcaSpec, find_tca
+from tca_mj.tca import find_tca
 
 BEST, LAST = "best.json", "last.json"
 
@@ -65,6 +66,8 @@ class SearchConfig(Checked):
         episodes: Episodes per gait, the same for all of a generation, up to 10 000.
         options: Options of every episode; a robot of its own has ``randomise`` 0 and its numbers.
         tca: The robot's muscle, a file or a name in ``tca_mj.CATALOGUE``; None for its own.
+        design: Figures of the robot that differ from the default, see
+            ``tca_mj.agents.design.robot_of``.
         settling: Time of each episode that is not judged, as in ``Trial`` [s].
         window: Time that is judged [s].
         validate_every: Generations after which the middle of the search is judged, by the same
@@ -88,9 +91,12 @@ class SearchConfig(Checked):
     validate_every: Many = 8
     validation_episodes: Few = 8
     tca: str | None = None
+    design: Mapping[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         Checked.__post_init__(self)
+        if self.design:
+            robot_of(self.task, self.design)
         if task_class(self.task).legs != len(TROT):
             raise ValueError(f"task must have four legs that a gait can drive, got {self.task!r}")
 
@@ -148,8 +154,9 @@ def search(
         OSError: If something cannot be written.
         KeyboardInterrupt: As it came, after everything was written.
     """
-    tca = None if config.tca is None else find_tca(config.tca)
-    made_for = _relied_on(config.task, tca)
+    robot = {} if config.tca is None else {"tca": find_tca(config.tca)}
+    robot |= robot_of(config.task, config.design) if config.design else {}
+    made_for = _relied_on(config.task, robot)
     gait, steering = first_gait(config.task, config.start)
     space = GaitSpace(centre=gait, hottest=task_class(config.task).hot_temperature)
     point = space.encode(gait, steering)
@@ -166,7 +173,7 @@ def search(
         ends.callback(board.close)
         bar = progress_bar(config.steps, unit="steps", done=state.steps, progress=progress)
         ends.callback(bar.close)
-        run = _Search(config, folder, space, point, state, known, board, tca, made_for)
+        run = _Search(config, folder, space, point, state, known, board, robot, made_for)
         ends.callback(run.save)
         if address is None:
             run.processes = ends.enter_context(Workers(workers))
@@ -195,7 +202,7 @@ class _Search:
         state: Where it stands, replaced as a whole.
         known: Episodes that are finished of a step of the search that is not.
         board: TensorBoard's.
-        tca: The robot's muscle; None for its own.
+        robot: What tasks are made with: the robot's muscle, another robot.
         made_for: What its gaits rely on, parts of a contract.
         processes: Who runs episodes.
     """
@@ -207,7 +214,7 @@ class _Search:
     state: SearchState
     known: dict[tuple[str, int], Headway]
     board: Any
-    tca: TcaSpec | None
+    robot: dict[str, Any]
     made_for: dict[str, Any]
     processes: Workers | ClusterWorkers = field(init=False)
 
@@ -292,7 +299,7 @@ class _Search:
             Trial(
                 task=config.task, gait=gait, steering=steering, seed=seed,
                 options=config.options, settling=config.settling, window=config.window,
-                tca=self.tca,
+                robot=self.robot,
             )
             for gait, steering in gaits
             for seed in seeds
@@ -346,9 +353,9 @@ class _Search:
         self.policy(best=False).save(self.folder.path / LAST)
 
 
-def _relied_on(task: str, tca: TcaSpec | None) -> dict[str, Any]:
+def _relied_on(task: str, robot: Mapping[str, Any]) -> dict[str, Any]:
     """What a gait relies on of its task: not on what else is seen."""
-    found = contract(walking(task, tca))
+    found = contract(walking(task, **robot))
     return {name: part for name, part in found.items() if name != "observation"}
 
 

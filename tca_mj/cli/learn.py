@@ -227,6 +227,8 @@ def _sweep(arguments: argparse.Namespace) -> int:
                                   design.leg.tca (name in the catalogue),
                                   design.leg.tca.pitch_angle, ...
       train.FIELD                 with --algo: train.seed, train.learner.learning_rate, ...
+      train.design.PATH           with --algo: of the robot that is trained and evaluated, so that
+                                  each design gets the gait that suits it
     A single value sets what is the same in all of them.
 
     examples:
