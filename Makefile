@@ -20,7 +20,7 @@ demo: $(INSTALLED)  ## the arm moves a screwdriver and a circuit board; recordin
 	$(BIN)/tca-mj demo pick-and-place --option object=pcb --out $(DEMO)/pcb
 	@for object in screwdriver pcb; do \
 	    echo "$$object:"; \
-	    for file in summary.json rollout.rrd rollout.mp4; do \
+	    for file in summary.json rollout.rrd rollout.mp4 rollout.html; do \
 	        path=$(DEMO)/$$object/$$file; \
 	        if [ -e "$$path" ]; then echo "  $$path"; else echo "  $$path (not written)"; fi; \
 	    done; \

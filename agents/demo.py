@@ -10,7 +10,7 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 
-from tca_mj.agents.episode import PLOT, RECORDING, VIDEO, Duration, Episode
+from tca_mj.agents.episode import PAGE, PLOT, RECORDING, VIDEO, Duration, Episode
 from tca_mj.agents.policies import Policy, Preprocessing
 from tca_mj.agents.policies.actors import actor, arguments_of
 from tca_mj.checks import Seed, door
@@ -36,12 +36,13 @@ def play(
 ) -> dict[str, Any]:
     """Runs one episode of any policy in any task and writes what happened.
 
-    Into ``out`` go ``summary.json``, ``rollout.rrd``, ``rollout.mp4`` and ``rollout.png``; files
-    of these names that lay there are replaced. However the episode ends, by Ctrl-C or an error
-    too, they hold all that happened until then. What this machine cannot make (a film without
-    OpenGL or imageio, a plot without Matplotlib) is left out with a line that says why, and so is
-    what fails meanwhile, as on a full disk: nothing of that ends the episode. What begins no file
-    is refused: a folder that cannot be written, or in which another demo writes its recording.
+    Into ``out`` go ``summary.json``, ``rollout.rrd``, ``rollout.mp4``, ``rollout.html`` and
+    ``rollout.png``; files of these names that lay there are replaced. However the episode ends, by
+    Ctrl-C or an error too, they hold all that happened until then. What this machine cannot make (a
+    film without OpenGL or imageio, a plot without Matplotlib) is left out with a line that says
+    why, and so is what fails meanwhile, as on a full disk: nothing of that ends the episode. What
+    begins no file is refused: a folder that cannot be written, or in which another demo writes its
+    recording.
 
     Args:
         task: Gymnasium id, or ``module:id``.
@@ -96,7 +97,7 @@ def play(
         if isinstance(policy, str | Path) else policy
     )  # fmt: skip
     name = str(policy) if named else type(policy).__name__
-    files = (RECORDING, VIDEO, PLOT) if video else (RECORDING, PLOT)
+    files = (RECORDING, VIDEO, PAGE, PLOT) if video else (RECORDING, PAGE, PLOT)
     with nullcontext() if out is None else claimed(out):
         episode = Episode(
             env, acting, names=(task, name), seed=seed, out=out, options=options, files=files

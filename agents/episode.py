@@ -29,10 +29,12 @@ from tca_mj.envs.wrappers import RecordRerun
 from tca_mj.machine import machine, versions
 from tca_mj.record.film import Film, FilmSpeed
 from tca_mj.record.plots import rollout_plot
+from tca_mj.record.webpage import WebPage
 
 Duration = Annotated[float, partial(number, above=0.0, at_most=86_400.0, unit="s")]
 
 SUMMARY, RECORDING, VIDEO, PLOT = "summary.json", "rollout.rrd", "rollout.mp4", "rollout.png"
+PAGE = "rollout.html"
 
 _FPS = 20.0  # of the film: a picture costs as much as half a second of simulation
 _BAR = "{desc:9} |{bar}| {n:.1f} of at most {total:.0f} s simulated, {elapsed} real"
@@ -51,7 +53,7 @@ class Episode:
         seed: Seed,
         out: Path | None,
         options: Mapping[str, Any] | None = None,
-        files: Sequence[str] = (RECORDING, VIDEO, PLOT),
+        files: Sequence[str] = (RECORDING, VIDEO, PAGE, PLOT),
     ) -> None:
         """Resets policy and environment; only then are the files in ``out`` touched.
 
@@ -80,6 +82,7 @@ class Episode:
         self.wall: dict[str, float] = defaultdict(float)
         self.left_out: dict[str, str] = {}
         self._film: Film | None = None
+        self._page: WebPage | None = None
         self.clock: list[float] = []
         self.places: list[Headway | None] = []
         self.samples: dict[str, list[Any]] = defaultdict(list)
@@ -106,7 +109,7 @@ class Episode:
         # What is called back at the end, the last first, whatever happens to the others.
         with ExitStack() as ends:
             if self.out is not None:
-                for name in (VIDEO, PLOT):
+                for name in (VIDEO, PAGE, PLOT):
                     (self.out / name).unlink(missing_ok=True)
                 write_json(self.out / SUMMARY, self.summary())
                 ends.callback(self._write, self.out)
@@ -114,12 +117,15 @@ class Episode:
                     ends.callback(self._plot, self.out / PLOT)
             ends.callback(self.env.close)
             ends.callback(self._end_film)
+            ends.callback(self._end_page)
             bar = progress_bar(limit, unit="s", progress=progress, terminal=_BAR)
             ends.callback(bar.close)
             try:
                 if VIDEO in self.files and self.out is not None:
                     self._attempt("video", VIDEO, partial(self._begin_film, self.out, speed))
-                    self._film_on()
+                if PAGE in self.files and self.out is not None:
+                    self._attempt("page", PAGE, partial(self._begin_page, self.out, speed))
+                self._film_on()
                 while not self.ending:
                     self._go_on()
                     bar.set_description_str(self.policy.phase, refresh=False)
@@ -237,12 +243,27 @@ class Episode:
         self._film = Film(self.sim, path, fps=_FPS, speed=speed, camera=camera)
 
     def _film_on(self) -> None:
-        """Films the present; if that fails there is no film from here on."""
+        """Films the present, and keeps it for the page; what fails is left out from here on."""
         film = self._film
         if film is not None and not self._attempt("video", VIDEO, film.frame):
             self._film = None
             with suppress(Exception):
                 film.close()
+        page = self._page
+        if page is not None:
+            kept = partial(page.frame, self.policy.phase)
+            if not self._attempt("page", PAGE, kept):
+                self._end_page()
+
+    def _begin_page(self, out: Path, speed: float) -> None:
+        title = f"{self.names[0]}, {self.names[1]}, seed {self.seed}"
+        interval = max(self.task.control_period, speed / _FPS)
+        self._page = WebPage(self.sim, out / PAGE, title=title, interval=interval, speed=speed)
+
+    def _end_page(self) -> None:
+        page, self._page = self._page, None
+        if page is not None:
+            self._attempt("page", PAGE, page.close)
 
     def _end_film(self) -> None:
         if self._film is not None:

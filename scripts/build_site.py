@@ -24,8 +24,14 @@ SETTINGS = {
     "project": "tca-mj", "html_title": "tca-mj", "language": "en", "extensions": ["myst_parser"],
     "root_doc": "index", "myst_heading_anchors": 4, "smartquotes": False,
     "html_theme": "furo", "html_copy_source": False, "html_show_sphinx": False,
-    "html_use_index": False,
+    "html_use_index": False, "html_extra_path": ["replays"],
     "html_show_search_summary": False,  # it would fetch the pages, which no browser does from files
+}  # fmt: skip
+# Gaits that are replayed, by page: title, task, policy, what is left out and shown [s], and speed.
+REPLAYS = {
+    "replay-crawl": ("Crawling", "TCA/TetrapodCrawl-v0", "tetrapod-crawl-sac", 12.0, 24.0, 4.0),
+    "replay-walk": ("Walking", "TCA/TetrapodWalk-v0", "tetrapod-walk-sac", 12.0, 24.0, 4.0),
+    "replay-shimmy": ("Shimmying", "TCA/TetrapodShimmy-v0", "tetrapod-shimmy", 12.0, 24.0, 4.0),
 }  # fmt: skip
 # What the theme leaves out for those who listen to a page or have no mouse.
 HEARD = {
@@ -79,7 +85,8 @@ def navigation(index: str) -> str:
     for title, body in re.findall(r"^### (.+)\n((?:(?!#).*\n)*)", index, re.MULTILINE):
         names = re.findall(r"^\| \[.*?\]\(([\w-]+)\.md\)", body, re.MULTILINE)
         lists.append(toctree(names, title))
-    lists.append(toctree(["all-tasks", "all-robots", "commands", "all-names"], "Reference"))
+    generated = ["replays", "all-tasks", "all-robots", "commands", "all-names"]
+    lists.append(toctree(generated, "Reference"))
     return "\n\n".join([index, *lists, toctree([*OUTSIDE.values()], "Project"), ""])
 
 
@@ -95,6 +102,47 @@ def write_pages(pages: Path) -> None:
         listed = toctree([name.removesuffix(".md") for name in below]) if below else ""
         write_whole(pages / path, f"{text}\n\n{listed}\n".encode())
     shutil.copytree(ROOT / "docs" / "pictures", pages / "pictures", dirs_exist_ok=True)
+    write_replays(pages)
+
+
+def replay(path: Path, task: str, policy: str, warm: float, shown: float, speed: float) -> None:
+    """Writes a page that replays a gait.
+
+    Args:
+        path: The page.
+        task: Gymnasium id.
+        policy: Who acts.
+        warm: Time that is not shown, until the gait is steady [s].
+        shown: Time that is [s].
+        speed: Simulated seconds per second.
+    """
+    from tca_mj.agents.policies import arguments_of, load_policy
+    from tca_mj.record import WebPage
+    from tca_mj.registry import make
+
+    env = make(task, disable_env_checker=True, **arguments_of(policy, task))
+    actor = load_policy(policy, env)
+    observation, info = env.reset(seed=0)
+    title = f"{task}: {policy}"
+    with WebPage(env.unwrapped.sim, path, title=title, interval=0.2, speed=speed) as page:
+        while info["time"] < warm + shown:
+            observation, *_, info = env.step(actor.act(observation))
+            if info["time"] >= warm:
+                page.frame()
+
+
+def write_replays(pages: Path) -> None:
+    """Writes the page of the replays and what it shows."""
+    blocks = [
+        "# Replays", "Gaits that come with the package, simulated when this site was built. Drag to"
+        " turn, scroll to come closer. A demo of yours leaves such a page, too:"
+        " [recordings](recording.md#in-a-browser).",
+    ]  # fmt: skip
+    for name, (title, *how) in REPLAYS.items():
+        replay(pages / "replays" / f"{name}.html", *how)
+        blocks += [f"## {title}", f'<iframe src="{name}.html" title="{title}" loading="lazy"'
+                   ' style="width: 100%; aspect-ratio: 4 / 3; border: 0"></iframe>']  # fmt: skip
+    write_whole(pages / "replays.md", ("\n\n".join(blocks) + "\n").encode())
 
 
 def build(pages: Path, out: Path) -> int:

@@ -85,7 +85,7 @@ def test_the_scripted_agent_for_a_moment(tmp_path: Path) -> None:
     out = tmp_path / "new" / "folder"
     result = pick_and_place(object="pcb", seed=3, out=out, max_duration=0.4)
     assert result == summary_of(out)
-    assert result["files"] == ["rollout.rrd", *drawn, "rollout.png"]
+    assert result["files"] == ["rollout.rrd", *drawn, "rollout.html", "rollout.png"]
     assert sorted(result["left_out"]) == sorted({"rollout.mp4"} - set(drawn))
     assert (result["success"], result["ending"]) == (False, "stopped after 0.4 s")
     assert (result["object"], result["seed"], result["duration"]) == ("pcb", 3, 0.4)
@@ -175,7 +175,7 @@ def test_without_opengl_only_the_film_is_missing(
     pytest.importorskip("matplotlib")
     monkeypatch.setenv("MUJOCO_GL", "disable")
     result = pick_and_place(policy=Stub(), out=tmp_path, max_duration=0.2)
-    assert result["files"] == ["rollout.rrd", "rollout.png"]
+    assert result["files"] == ["rollout.rrd", "rollout.html", "rollout.png"]
     assert "MUJOCO_GL=disable" in result["left_out"]["rollout.mp4"]
     assert "rollout.mp4 is left out: rendering is switched off" in capsys.readouterr().out
 
@@ -186,7 +186,7 @@ def test_without_the_demo_extra_it_says_what_to_install(
     for module in ("imageio_ffmpeg", "matplotlib.figure"):
         monkeypatch.setitem(sys.modules, module, None)
     result = pick_and_place(policy=Stub(), out=tmp_path, max_duration=0.2)
-    assert result["files"] == ["rollout.rrd"]
+    assert result["files"] == ["rollout.rrd", "rollout.html"]
     assert sorted(result["left_out"]) == ["rollout.mp4", "rollout.png"]
     assert capsys.readouterr().out.count("pip install 'matplotlib>=3.9' 'imageio>=2.34'") == 2
 

@@ -311,7 +311,8 @@ def test_a_demo_of_what_diverges_is_whole(
     result = reach(tmp_path, tear, video=False)
     assert result == strict(tmp_path / "summary.json")
     assert result["ending"].startswith("diverged") and "diverged" in outcome(result)
-    assert (result["files"], result["left_out"]) == (["rollout.rrd", "rollout.png"], {})
+    assert result["files"] == ["rollout.rrd", "rollout.html", "rollout.png"]
+    assert result["left_out"] == {}
     assert result["duration"] == pytest.approx(0.3, abs=0.1)
     assert read(tmp_path / "rollout.rrd").events[-1][1] == result["ending"]
 
@@ -330,7 +331,7 @@ def test_without_an_encoder_only_the_film_is_missing(
         monkeypatch.setenv("IMAGEIO_FFMPEG_EXE", missing)
     result = reach(tmp_path)
     assert result["ending"] == "stopped after 0.5 s"
-    assert result["files"] == ["rollout.rrd", "rollout.png"]
+    assert result["files"] == ["rollout.rrd", "rollout.html", "rollout.png"]
     assert "ffmpeg" in result["left_out"]["rollout.mp4"]
 
 
@@ -350,7 +351,7 @@ def test_an_encoder_that_dies_cuts_the_film_off(
     result = reach(tmp_path)
     assert (result["duration"], len(calls)) == (0.5, 3)
     assert result["left_out"] == {"rollout.mp4": "broken pipe"}
-    assert result["files"] == ["rollout.rrd", "rollout.mp4", "rollout.png"]
+    assert result["files"] == ["rollout.rrd", "rollout.mp4", "rollout.html", "rollout.png"]
     assert "rollout.mp4 is cut off: broken pipe" in capsys.readouterr().out
 
 

@@ -77,6 +77,7 @@ def _demo(arguments: argparse.Namespace) -> int:
       summary.json   success, energy, peak temperatures, duration, versions, machine
       rollout.rrd    everything over time; open it with `rerun rollout.rrd`
       rollout.mp4    a film (needs OpenGL and the extra demo)
+      rollout.html   the same to be turned and replayed in any browser
       rollout.png    power, temperature, tension, bend (needs the extra demo)
 
     Exit code: 0 if the episode is a success (a gait: it came to the end of its time), 1 if not, 2

@@ -10,9 +10,10 @@ from tca_mj.record.render import (
     colour_tendons,
     gl_backend,
 )
+from tca_mj.record.webpage import WebPage
 
 __all__ = [
     "Curve", "Film", "Offscreen", "QUANTITIES", "Recorded", "Recorder", "Recording",
-    "RenderingUnavailable", "Watched", "colour_tendons", "gl_backend", "read", "rollout_plot",
-    "series_colours", "temperature_colour", "write_csv",
+    "RenderingUnavailable", "Watched", "WebPage", "colour_tendons", "gl_backend", "read",
+    "rollout_plot", "series_colours", "temperature_colour", "write_csv",
 ]  # fmt: skip

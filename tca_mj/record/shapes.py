@@ -14,7 +14,7 @@ _UNSET = (0.5, 0.5, 0.5, 1.0)  # MuJoCo's default colour: a material replaces it
 
 def body_paths(model: mujoco.MjModel) -> dict[int, str]:
     """Entity path of every body that has something to show, by body id."""
-    shown = [b for b in range(model.nbody) if _visible(model, b)]
+    shown = [b for b in range(model.nbody) if visible(model, b)]
     parts = {}
     for body in shown:
         name = model.body(body).name or f"body{body}"
@@ -33,14 +33,14 @@ def body_paths(model: mujoco.MjModel) -> dict[int, str]:
     }
 
 
-def _visible(model: mujoco.MjModel, body: int) -> list[int]:
+def visible(model: mujoco.MjModel, body: int) -> list[int]:
     """Geoms of a body that are shown."""
     first = int(model.body_geomadr[body])
     geoms = range(first, first + int(model.body_geomnum[body])) if first >= 0 else range(0)
-    return [g for g in geoms if model.geom_group[g] in _VISIBLE_GROUPS and _rgba(model, g)[3] > 0]
+    return [g for g in geoms if model.geom_group[g] in _VISIBLE_GROUPS and rgba(model, g)[3] > 0]
 
 
-def _rgba(model: mujoco.MjModel, geom: int) -> NDArray[np.float64]:
+def rgba(model: mujoco.MjModel, geom: int) -> NDArray[np.float64]:
     own, material = model.geom_rgba[geom], int(model.geom_matid[geom])
     if material >= 0 and np.array_equal(own, _UNSET):
         own = model.mat_rgba[material]
@@ -56,7 +56,7 @@ def moving_bodies(model: mujoco.MjModel) -> NDArray[np.bool_]:
 def extent(model: mujoco.MjModel, data: mujoco.MjData) -> tuple[NDArray[np.float64], float]:
     """Centre (3,) and size [m] of what is shown and moves; of the whole model if nothing does."""
     moving = moving_bodies(model)
-    geoms = [g for b in np.flatnonzero(moving) for g in _visible(model, int(b))]
+    geoms = [g for b in np.flatnonzero(moving) for g in visible(model, int(b))]
     if not geoms:
         return np.array(model.stat.center), float(model.stat.extent)
     reach = model.geom_rbound[geoms, None]
@@ -69,7 +69,7 @@ def ground_height(model: mujoco.MjModel) -> float | None:
     """Height of the highest level plane that is fixed to the world [m], None without one."""
     heights = [
         float(model.geom_pos[g, 2])
-        for g in _visible(model, 0)
+        for g in visible(model, 0)
         if model.geom_type[g] == int(mujoco.mjtGeom.mjGEOM_PLANE)
         and _axis_z(model.geom_quat[g])[2] > 1.0 - 1e-9
     ]
@@ -80,14 +80,14 @@ def shapes(model: mujoco.MjModel, body: int, size: float) -> Iterator[tuple[str,
     """Geometry of a body in its own frame: one entry per kind of geom, one per mesh."""
     solid = rerun.components.FillMode.Solid
     kinds: dict[int, list[int]] = {}
-    for geom in _visible(model, body):
+    for geom in visible(model, body):
         kinds.setdefault(int(model.geom_type[geom]), []).append(geom)
     types = mujoco.mjtGeom
     for kind, geoms in kinds.items():
         position, dimension = model.geom_pos[geoms], model.geom_size[geoms]
         look = {
             "quaternions": model.geom_quat[geoms][:, [1, 2, 3, 0]],
-            "colors": rgba_bytes(np.array([_rgba(model, g) for g in geoms])),
+            "colors": rgba_bytes(np.array([rgba(model, g) for g in geoms])),
             "fill_mode": solid,
         }
         if kind == int(types.mjGEOM_PLANE):
@@ -136,7 +136,7 @@ def _mesh(model: mujoco.MjModel, geom: int) -> rerun.Mesh3D:
         vertex_positions=model.geom_pos[geom] + corner.reshape(-1, 3) @ turn.T,
         vertex_normals=normal.reshape(-1, 3) @ turn.T,
         triangle_indices=np.arange(corner.size // 3, dtype=np.uint32).reshape(-1, 3),
-        albedo_factor=rgba_bytes(_rgba(model, geom)),
+        albedo_factor=rgba_bytes(rgba(model, geom)),
     )
 
 

@@ -42,6 +42,8 @@ _Lengths = Annotated[tuple[float, float], partial(_span, above=0.0, at_most=10.0
 _Cores = Annotated[tuple[float, float], partial(_span, above=0.0, at_most=0.05, unit="m")]
 _Angles = Annotated[tuple[float, float], partial(_span, above=0.0, below=0.5 * math.pi, unit="rad")]
 _Indices = Annotated[tuple[float, float], partial(_span, above=1.0)]
+_Strands = Annotated[tuple[int, int], _counts]
+_Part = Annotated[float, partial(number, above=0.0, at_most=1.0)]
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -111,10 +113,10 @@ class Space(Checked):
     core_diameter: _Cores = (0.2e-3, 2.0e-3)
     groove_pitch_angle: _Angles = (0.21, 0.52)
     fibre_length: _Lengths = (0.05, 3.0)
-    strands: Annotated[tuple[int, int], _counts] = (1, 4)
+    strands: _Strands = (1, 4)
     spring_index: _Indices = (1.1, 2.5)
     annealing_temperature: Finite = 180.0
-    stress_share: Annotated[float, partial(number, above=0.0, at_most=1.0)] = 0.5
+    stress_share: _Part = 0.5
 
     def __post_init__(self) -> None:
         Checked.__post_init__(self)
