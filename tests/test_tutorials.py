@@ -7,11 +7,16 @@ import sys
 import pytest
 from test_docs import ROOT
 
+from tca_mj.record.render import RenderingUnavailable, gl_backend
+
 sys.path.insert(0, str(ROOT / "scripts"))
 import tutorials  # noqa: E402
 
 # What takes longer than seconds, and how it is made quick; nothing is compared then.
-QUICK: dict[str, list[str]] = {}
+QUICK = {
+    "robot": ["(50.0, 80.0, 110.0, 130.0)=(110.0,)", "range(80)=range(40)", "--nodes 16=--nodes 6"],
+}
+DRAWN = ("robot", "train")  # by OpenGL
 LONG = pytest.mark.long
 WRITTEN = [name for name in tutorials.NAMES if tutorials.page_of(name).exists()]
 
@@ -19,6 +24,12 @@ WRITTEN = [name for name in tutorials.NAMES if tutorials.page_of(name).exists()]
 def walked(name, *more):
     """A walk in a process of its own, as it is typed."""
     pytest.importorskip("matplotlib")
+    if name in DRAWN:
+        pytest.importorskip("imageio_ffmpeg")
+        try:
+            gl_backend()
+        except RenderingUnavailable as error:
+            pytest.skip(str(error))
     command = [sys.executable, str(ROOT / "scripts" / "tutorials.py"), name, *more]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
