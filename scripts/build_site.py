@@ -3,8 +3,9 @@
     python scripts/build_site.py             into build/site; open build/site/index.html
     python scripts/build_site.py FOLDER      elsewhere
 
-A link that leads nowhere, also to a section, a page that is in no list, or a warning of any other
-kind ends it with code 1. Nothing on the site asks another host for anything.
+The tutorials are notebooks besides, in ``notebooks``. A link that leads nowhere, also to a section,
+a page that is in no list, or a warning of any other kind ends it with code 1. Nothing on the site
+asks another host for anything.
 """
 
 import os
@@ -13,6 +14,8 @@ import shutil
 import sys
 from collections.abc import Iterable
 from pathlib import Path
+
+from notebooks import write_notebook
 
 from tca_mj.files import write_whole
 
@@ -90,12 +93,22 @@ def navigation(index: str) -> str:
     return "\n\n".join([index, *lists, toctree([*OUTSIDE.values()], "Project"), ""])
 
 
+def with_notebook(path: str, text: str) -> str:
+    """A tutorial's page with where its notebook lies, below the title; others as they are."""
+    found = re.fullmatch(r"docs/(tutorial-\w+)\.md", path)
+    if not found:
+        return text
+    link = f'<a href="notebooks/{found[1]}.ipynb" download>This page as a notebook</a>'
+    title, _, rest = text.partition("\n")
+    return f"{title}\n\n{link}\n{rest}"
+
+
 def write_pages(pages: Path) -> None:
     """Writes all pages of the site as Markdown into an empty folder."""
     from reference_pages import reference  # slow: it loads all of the package
 
     for path in [*OUTSIDE, *sorted(f"docs/{page.name}" for page in (ROOT / "docs").glob("*.md"))]:
-        text = gather(path, pages)
+        text = with_notebook(path, gather(path, pages))
         text = navigation(text) if place(path) == "index.md" else text
         write_whole(pages / place(path), text.encode())
     for path, (text, below) in reference().items():
@@ -172,6 +185,8 @@ def main() -> int:
         shutil.rmtree(folder, ignore_errors=True)
     write_pages(pages)
     code = build(pages, out)
+    for page in sorted((ROOT / "docs").glob("tutorial-*.md")):
+        write_notebook(page.stem.removeprefix("tutorial-"), out / "notebooks")
     if code == 0:
         print(f"open {out / 'index.html'}")
     return code

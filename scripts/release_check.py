@@ -48,6 +48,7 @@ CHECKS = {
     "style": "make lint",
     "tests": PYTEST,
     "long tests": f"{PYTEST} -m long",
+    "tutorials": f"{PYTHON} scripts/tutorials.py",
     "site": "make docs",
     "browser": "npm install --silent --prefix build/axe axe-core && "
                f"{PYTHON} -m pip install -q selenium && {PYTHON} scripts/audit_site.py",

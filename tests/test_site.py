@@ -123,6 +123,15 @@ def test_the_site_has_what_the_code_says(site):
     assert "hysteresi" in (out / "searchindex.js").read_text("utf-8")
 
 
+def test_tutorials_of_the_site_are_notebooks_too(site):
+    html, out = site
+    pages = sorted(name for name in html if name.startswith("tutorial-"))
+    made = sorted(path.name for path in (out / "notebooks").iterdir())
+    assert made == [name.replace(".html", ".ipynb") for name in pages] != []
+    for name, page in zip(made, pages, strict=True):
+        assert f"notebooks/{name}" in html[page].links
+
+
 def test_a_link_to_nowhere_ends_the_building(tmp_path):
     pytest.importorskip("furo")
     (tmp_path / "index.md").write_text("# Start\n\n[there](#start), [nowhere](#end)\n")
