@@ -17,6 +17,7 @@ from tca_mj import BistableSpec, pages
 from tca_mj.agents.scripts.jump import JumpPolicy
 from tca_mj.envs.jump import Jump
 from tca_mj.validation.bistable import ANGLES, Snap, landscape, lines, snap
+from tca_mj.validation.pulses import PULSES, endured
 
 SPEC = BistableSpec()
 KINDS = {"symmetric": 0.0, "asymmetric": 50.0, "monostable": 110.0}  # angle of the spine [deg]
@@ -67,7 +68,7 @@ def jumping(folder: Path) -> None:
 
 
 def tables() -> str:
-    """Triggering forces and the snap, as Markdown."""
+    """Triggering forces, the snap and the published pulses, as Markdown."""
     force = lines(SPEC)
     rows = ["| θ0 [°] | F_t1: arc, elastica, MuJoCo [N] | F_t2 [N] | states at rest [°] |",
             "|---|---|---|---|"]  # fmt: skip
@@ -87,7 +88,23 @@ def tables() -> str:
         both = (snap(SPEC, 1e-3 * step, kind) for kind in
                 (None, int(mujoco.mjtIntegrator.mjINT_DISCRETE)))  # fmt: skip
         rows.append(f"| {step:g} | {' | '.join(told(found) for found in both)} |")
-    return "\n".join(rows)
+    return "\n".join([*rows, "", *pulses()])
+
+
+def pulses() -> list[str]:
+    """The published pulses and the longest safe ones, as Markdown."""
+    safe = f"{Jump.safe_temperature:.0f} °C"
+    heads = ["to", "published", "then, alone [°C]", "in the robot [°C]", "has gone over",
+             f"{safe} after, alone [s]", "in the robot [s]"]  # fmt: skip
+    rows = []
+    for pulse in PULSES:
+        found = endured(pulse)
+        rows.append([
+            pulse.name, f"{pulse.amperes:g} A, {pulse.seconds:g} s", f"{found.alone:.0f}",
+            f"{found.inside:.0f}", f"after {found.over:.2f} s, at {found.hot:.0f} °C",
+            f"{found.safe_alone:.2f}", f"{found.safe_inside:.2f}",
+        ])  # fmt: skip
+    return pages.table(heads, rows)
 
 
 if __name__ == "__main__":

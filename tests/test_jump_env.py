@@ -10,6 +10,7 @@ from tca_mj.agents.scripts.jump import JumpPolicy
 from tca_mj.envs.jump import ACTION, OBSERVATION, Jump
 from tca_mj.robots.jumper import JumperSpec
 from tca_mj.sim import Drive, Haste
+from tca_mj.validation.pulses import JUMP, endured
 
 OFF = np.full(ACTION.size, -1.0, np.float32)
 
@@ -95,10 +96,16 @@ def test_the_energy_of_the_snap_is_accounted_for():
     assert lost + given - taken == pytest.approx(kept, abs=0.03 * lost)
 
 
-def test_the_published_pulse_would_melt_the_tca():
-    """2.5 A for 0.3 s, if it did not go over and cool before."""
+def test_the_published_pulse_is_longer_than_is_safe():
+    """2.5 A for 0.3 s; what is safe is more than the robot needs."""
+    found = endured(JUMP)
+    assert found.alone > found.inside > Jump.max_temperature
+    assert found.over < found.safe_inside < JUMP.seconds and found.safe_alone < found.safe_inside
+    # The lone TCA by hand: I² R t/C, 6.7 ohm/dm.
     heat = Jump(action="power").heat
-    assert 25.0 + 0.3 * Jump.max_power / float(heat.capacity[0]) > 220.0
+    assert found.alone - 25.0 == pytest.approx(
+        2.5**2 * 0.3 * 67.0 * 0.094 / float(heat.capacity[0]), rel=0.02
+    )
 
 
 def test_a_batch_snaps_like_one(shared):
