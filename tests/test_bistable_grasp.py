@@ -8,6 +8,7 @@ from tca_mj.envs.bistable_grasp import ACTION, OBSERVATION, BistableGrasp
 from tca_mj.robots.bistable_gripper import BistableGripperSpec, bistable_gripper
 from tca_mj.sim import Simulation
 from tca_mj.validation.carrying import limit_load, without_bands
+from tca_mj.validation.pulses import CLOSE, OPEN, endured
 
 OFF = ACTION.still
 SURE = {"tca_gain": 1.0, "heat_loss": 1.0, "ambient": 25.0}
@@ -84,6 +85,15 @@ def test_the_script_carries_fifteen_grams_for_a_minute_without_power(shared):
     terms = {name: sum(info["reward_terms"][name] for info in infos[1:]) for name in shared.terms}
     assert terms["hold"] == pytest.approx(10.0, abs=0.1) and terms["goal"] == 20.0
     assert sum(rewards) == pytest.approx(sum(terms.values()))
+
+
+def test_a_current_that_would_melt_the_tca_alone_opens_the_gripper_in_time_that_is_safe():
+    """1.5 A close it in the published 0.8 s; to open it they need longer than 1.5 s."""
+    close, open_ = endured(CLOSE), endured(OPEN)
+    melting = BistableGripperSpec().finger.tca.fibre.melting_temperature
+    assert close.over < CLOSE.seconds and close.inside < BistableGrasp.safe_temperature
+    assert open_.alone > melting and open_.inside < BistableGrasp.safe_temperature
+    assert OPEN.seconds < open_.over < open_.safe_inside
 
 
 def test_what_is_let_go_elsewhere_is_no_success(shared):
