@@ -3,14 +3,17 @@
 import hashlib
 import pickle
 import warnings
-from dataclasses import asdict
+from dataclasses import asdict, replace
 
 import gymnasium as gym
 import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
 
+import tca_mj
 from tca_mj.agents.demo import play
+from tca_mj.agents.policies.files import SavedPolicy
+from tca_mj.agents.policies.load import find
 from tca_mj.agents.scripts.course import (
     CRAWL,
     HURRY,
@@ -23,6 +26,7 @@ from tca_mj.agents.scripts.course import (
     Go,
     stages,
 )
+from tca_mj.agents.scripts.course_quick import LearnedGait
 from tca_mj.cli import outcome, speed_table
 from tca_mj.envs.course import ACTION, OBSERVATION, TetrapodCourse
 from tca_mj.variation import Variation
@@ -293,6 +297,38 @@ def test_the_crawl_goes_forward_and_the_walk_is_faster():
         assert env.sim.temperature.max() < 175.0 and env.sim.tension.max() < 0.78
     assert speeds["crawl"] > 0.5 * 2.4e-3
     assert speeds["walk"] > 0.5 * 9e-3
+
+
+@pytest.mark.parametrize("name", ["tetrapod-walk-sac", "tetrapod-shapes"])
+def test_a_learned_gait_asks_for_what_its_own_task_makes_of_it(name, monkeypatch):
+    """The table and the hottest temperature are the task's, whatever it is called."""
+    saved = SavedPolicy.read(find(name))
+    env = tca_mj.make(saved.task, **saved.arguments).unwrapped
+    seen, _ = env.reset(seed=1)
+    learned = LearnedGait.of(saved)
+    rows = env.observation.read(seen)
+    asked = learned.temperatures(rows)
+    own = env.heated(saved.network(seen).astype(np.float64))
+    assert asked.ravel() == pytest.approx(own[:12], rel=1e-12)
+    assert learned.table is env.table and learned.period == env.control_period == 0.4
+    warm = env.safe_temperature - 25.0
+    monkeypatch.setattr(type(env), "safe_temperature", 140.0)
+    cooler = LearnedGait.of(saved).temperatures(rows)
+    assert cooler - 25.0 == pytest.approx((asked - 25.0) * 115.0 / warm)
+
+
+def test_a_policy_that_is_no_gait_of_four_legs_is_refused():
+    saved = SavedPolicy.read(find("tetrapod-walk-sac"))
+    seen = dict(saved.made_for["observation"])
+    more = {**saved.made_for, "observation": {**seen, "smell": [1, "-", 0.0, None]}}
+    for wrong, said in (
+        (replace(saved, made_for=more), r"must see what TCA/TetrapodWalk-v0 shows, .*'smell'"),
+        (replace(saved, arguments={"action": "power"}), "must ask for temperatures, got .*power"),
+        (SavedPolicy.read(find("tetrapod-walk")), "must have a network, got a gait"),
+        (replace(saved, task="TCA/BendReach-v0"), "a task with four legs, got TCA/BendReach-v0"),
+    ):
+        with pytest.raises(ValueError, match=said):
+            LearnedGait.of(wrong)
 
 
 def test_the_demo_writes_what_happened(tmp_path):

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -18,17 +18,19 @@ from numpy.typing import NDArray
 
 from tca_mj.agents.policies.files import SavedPolicy
 from tca_mj.agents.policies.load import find
+from tca_mj.agents.policies.network import Network
 from tca_mj.agents.scripts.course import HURRY, PUSH, STEP, Bend, CourseWalker, Go
 from tca_mj.agents.scripts.tetrapod import CRAWL, WALK
 from tca_mj.envs.command import Command, Following
 from tca_mj.envs.course import Places, TetrapodCourse
-from tca_mj.envs.gaits import OBSERVATION, TASKS, told
-from tca_mj.envs.shapes import OBSERVATION as SHAPED
+from tca_mj.envs.gaits import TASKS, told
+from tca_mj.envs.table import Table
+from tca_mj.registry import task_class
 from tca_mj.variation import AMBIENT
 
 Array = NDArray[np.float64]
 
-SHOVE = replace(PUSH, hot=(172.0,) * 3, warm=(60.0,) * 3)
+SHOVE = replace(PUSH, hot=(TetrapodCourse.safe_temperature,) * 3, warm=(60.0,) * 3)
 """``PUSH`` with hotter TCAs, which are quicker: 15 % faster on the robot that it was tried on."""
 
 SCRIPTED: dict[str, Any] = {"crawl": CRAWL, "walk": WALK, "mount": SHOVE, "shimmy": HURRY}
@@ -71,8 +73,54 @@ def quick(places: Places, gaits: Mapping[str, Any]) -> tuple[Go | Bend, ...]:
     )  # fmt: skip
 
 
+@dataclass(frozen=True, kw_only=True, slots=True)
+class LearnedGait:
+    """A learned gait, with what its policy and its task say of it.
+
+    Attributes:
+        network: The policy's network.
+        period: For how long it holds what it asks for [s].
+        table: What it sees.
+        hottest: Temperature that an action of 1 asks for [°C].
+    """
+
+    network: Network
+    period: float
+    table: Table
+    hottest: float
+
+    @classmethod
+    def of(cls, saved: SavedPolicy) -> LearnedGait:
+        """That of a policy.
+
+        Raises:
+            ValueError: If the policy has no network, asks for something else than the temperatures
+                of four legs, or sees something else than its task shows.
+        """
+        task = task_class(saved.task)
+        if saved.network is None:
+            raise ValueError(f"policy must have a network, got a {saved.kind} for {saved.task}")
+        if saved.arguments.get("action", "temperature") != "temperature":
+            raise ValueError(f"policy must ask for temperatures, got {dict(saved.arguments)}")
+        table: Table | None = getattr(task, "table", None)
+        if table is None or task.legs != 4:
+            raise ValueError(f"policy must be for a task with four legs, got {saved.task}")
+        seen = [[row.name, row.size, row.unit] for row in table.entries]
+        learned = [[name, *row[:2]] for name, row in saved.made_for.get("observation", {}).items()]
+        if learned and learned != seen:
+            raise ValueError(f"policy must see what {saved.task} shows, {seen}, got {learned}")
+        period = saved.arguments.get("control_period") or task.control_period
+        return cls(network=saved.network, period=float(period), table=table,
+                   hottest=float(task.safe_temperature))  # fmt: skip
+
+    def temperatures(self, rows: Mapping[str, Any]) -> Array:
+        """What it asks for, shape (4, 3), where it sees some rows [°C]."""
+        asked = self.network(self.table.pack(rows)).astype(np.float64)
+        return (AMBIENT + (asked + 1.0) * (self.hottest - AMBIENT) / 2.0).reshape(4, 3)
+
+
 class Learned:
-    """What learned gaits ask of the legs on the course: new temperatures every 0.4 s.
+    """What learned gaits ask of the legs on the course: temperatures, each held as it learned to.
 
     They see what they saw when they learned: the robot's own motion, TCAs, feet and contacts, and
     how far it is off the line down the middle of the course.
@@ -84,15 +132,21 @@ class Learned:
         Args:
             task: The task.
             policies: Name or file of the policy of each shape.
+
+        Raises:
+            FileNotFoundError: If there is no such policy.
+            ValueError: As ``LearnedGait.of``.
         """
         self._task = task
-        self._saved = {gait: SavedPolicy.read(find(name)) for gait, name in policies.items()}
+        self.gaits = {
+            gait: LearnedGait.of(SavedPolicy.read(find(name))) for gait, name in policies.items()
+        }
         self._following, self._time = Following(Command()), 0.0
         self._asked = np.full((4, 3), AMBIENT)
 
     def __call__(self, gait: str, above: float, begins: bool) -> Array:
         """Temperatures, shape (4, 3) [°C]; see ``CourseWalker``."""
-        task, saved, shape = self._task, self._saved[gait], TASKS[gait]
+        task, learned, shape = self._task, self.gaits[gait], TASKS[gait]
         x, y, _ = task.position.tolist()
         turn = task.stance.rotation(task.data)
         yaw, dt = math.atan2(turn[1, 0], turn[0, 0]), task.control_period
@@ -101,14 +155,11 @@ class Learned:
             self._following, self._time = new.moved(x, y, yaw, 0.0), 0.0
         else:
             self._following = self._following.moved(x, y, yaw, dt)
-        period = float(saved.arguments["control_period"])
+        period = learned.period
         if self._time % period < dt / 2.0 or period - self._time % period < dt / 2.0:
             rows = task.stance.sensed(task.sim, above)
             rows |= told(self._following, turn, shape.fastest)
-            table = SHAPED if "Shapes" in saved.task else OBSERVATION
-            assert saved.network is not None
-            asked = saved.network(table.pack(rows)).astype(np.float64)
-            self._asked = (AMBIENT + (asked + 1.0) * (172.0 - AMBIENT) / 2.0).reshape(4, 3)
+            self._asked = learned.temperatures(rows)
         self._time += dt
         return self._asked.copy()
 
