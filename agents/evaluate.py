@@ -31,11 +31,11 @@ from tca_mj.agents.progress import progress_bar
 from tca_mj.agents.rollout import rollout
 from tca_mj.agents.workers import Processes, Workers
 from tca_mj.checks import Checked, Seed, door, number, require_one_of, whole
+from tca_mj.drive import Timestep
 from tca_mj.files import claimed
 from tca_mj.machine import machine, versions
 from tca_mj.pages import table, write_result
 from tca_mj.registry import EpisodeSteps, episode_steps, make, task_class
-from tca_mj.sim import Timestep
 from tca_mj.tca import find_tca
 
 REPORT = "summary.md"

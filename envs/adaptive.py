@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from tca_mj.assets import mjcf
 from tca_mj.checks import door, some
+from tca_mj.drive import Drive, Timestep
 from tca_mj.envs.objects import named, stand, touching
 from tca_mj.envs.options import Option, Options, Setup, Uniform, variation_options
 from tca_mj.envs.outcome import TaskState, Verdict
@@ -27,7 +28,7 @@ from tca_mj.envs.vector import TaskVector
 from tca_mj.model.part import Part
 from tca_mj.model.scene import scene
 from tca_mj.robots.adaptive_gripper import SIDES, AdaptiveGripperSpec, adaptive_gripper
-from tca_mj.sim import Drive, Simulation, Timestep
+from tca_mj.sim import Simulation
 
 _TCAS = (1, 3, 2)  # of base, finger 0 and finger 1, left and right swapped
 

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from tca_mj.assets import mjcf
 from tca_mj.checks import door, require_one_of
+from tca_mj.drive import Drive, Timestep
 from tca_mj.envs.objects import named, stand, touching
 from tca_mj.envs.options import Option, Options, Setup, Uniform, variation_options
 from tca_mj.envs.outcome import Verdict
@@ -21,7 +22,7 @@ from tca_mj.envs.task import SimulatedTask, TaskArguments, parts
 from tca_mj.envs.vector import TaskVector
 from tca_mj.model.scene import scene
 from tca_mj.robots.arm import ArmSpec, arm
-from tca_mj.sim import Drive, Simulation, Timestep
+from tca_mj.sim import Simulation
 
 # Objects, with the width that the gripper has to reach round [m].
 OBJECTS = {"screwdriver": 8e-3, "pcb": 3.6e-3}

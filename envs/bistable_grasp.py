@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from tca_mj.assets import mjcf
 from tca_mj.checks import door
+from tca_mj.drive import Drive, Timestep
 from tca_mj.envs.holding import HeldObject, held_rows, holding_options
 from tca_mj.envs.objects import stand
 from tca_mj.envs.options import Option, Options, Setup, Uniform, variation_options
@@ -22,7 +23,7 @@ from tca_mj.envs.vector import TaskVector
 from tca_mj.model.scene import scene
 from tca_mj.modules.bistable import shaped
 from tca_mj.robots.bistable_gripper import SIDES, BistableGripperSpec, bistable_gripper
-from tca_mj.sim import Drive, Simulation, Timestep
+from tca_mj.sim import Simulation
 
 _TCAS = (3, 4, 1, 2)  # opens and closes finger 0, then finger 1; left and right swapped
 

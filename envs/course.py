@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from tca_mj.assets import mjcf
 from tca_mj.checks import Checked, door
+from tca_mj.drive import Drive, Timestep
 from tca_mj.envs.options import Option, Options, Setup, Uniform, variation_options
 from tca_mj.envs.outcome import Headway, Verdict
 from tca_mj.envs.stance import CAMERAS, Stance, tetrapod_scene
@@ -19,7 +20,6 @@ from tca_mj.envs.table import Entry, Table
 from tca_mj.envs.task import SimulatedTask, TaskArguments, parts
 from tca_mj.envs.vector import TaskVector
 from tca_mj.robots.tetrapod import LEGS, SPINES, TetrapodSpec
-from tca_mj.sim import Drive, Timestep
 from tca_mj.smp import HeaterSpec, SpineSpec
 
 TCAS = 3 * len(LEGS) + SPINES

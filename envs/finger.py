@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tca_mj.checks import door
+from tca_mj.drive import Drive, Timestep
 from tca_mj.envs.hanging import CLAMP, hang
 from tca_mj.envs.options import Constant, Option, Options, Setup, Uniform, variation_options
 from tca_mj.envs.outcome import Verdict
@@ -18,7 +19,7 @@ from tca_mj.envs.table import Entry, Table
 from tca_mj.envs.task import SimulatedTask, TaskArguments
 from tca_mj.envs.vector import TaskVector
 from tca_mj.modules.innervated import PAIR, InnervatedFingerSpec, innervated_finger
-from tca_mj.sim import Drive, Simulation, Timestep
+from tca_mj.sim import Simulation
 
 PERIOD = 0.02  # time between two readings, updates of the TCAs and actions [s]
 NOISE = 10e-3  # of a reading [ohm]; what ``CurrentSensor`` has at 5 V

@@ -8,11 +8,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from tca_mj.assets import mjcf
 from tca_mj.checks import door, number, require_one_of, within
+from tca_mj.drive import Timestep
 from tca_mj.model.chain import Place, Quaternion
 from tca_mj.model.part import Part, new_spec
 from tca_mj.model.scene import scene
 from tca_mj.modules.bending import BendingSpec, bending_module
-from tca_mj.sim import Simulation, Timestep
+from tca_mj.sim import Simulation
 from tca_mj.tca import Supply
 
 TCAS = 3

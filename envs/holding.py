@@ -10,13 +10,13 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from tca_mj.drive import Drive
 from tca_mj.envs.objects import named, touching, weigh
 from tca_mj.envs.options import Option, Uniform
 from tca_mj.envs.outcome import TaskState, Verdict
 from tca_mj.envs.rewards import tolerance
 from tca_mj.envs.table import Entry
 from tca_mj.envs.task import SimulatedTask
-from tca_mj.sim import Drive
 
 _LIFTED = 6e-3  # height at which an object counts as held [m]
 _FREE = 0.3  # time untouched after which an object is let go [s]

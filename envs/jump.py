@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from tca_mj.assets import mjcf
 from tca_mj.checks import door
+from tca_mj.drive import Drive, Haste, Timestep
 from tca_mj.envs.options import Option, Options, Setup, variation_options
 from tca_mj.envs.outcome import Verdict
 from tca_mj.envs.recipe import Recipe
@@ -21,7 +22,7 @@ from tca_mj.envs.vector import TaskVector
 from tca_mj.model.scene import scene
 from tca_mj.modules.bistable import shaped
 from tca_mj.robots.jumper import JumperSpec, jumper
-from tca_mj.sim import Drive, Haste, Simulation, Timestep
+from tca_mj.sim import Simulation
 
 OBSERVATION = Table(
     [

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tca_mj.checks import door, some
+from tca_mj.drive import Drive, Timestep
 from tca_mj.envs.hanging import hang
 from tca_mj.envs.options import Option, Options, Setup, Uniform, variation_options
 from tca_mj.envs.outcome import Verdict
@@ -20,7 +21,7 @@ from tca_mj.envs.vector import TaskVector
 from tca_mj.model.part import Part
 from tca_mj.modules.morphing import MorphingSpec, morphing_module
 from tca_mj.record.render import colour_tendons
-from tca_mj.sim import Drive, Simulation, Timestep
+from tca_mj.sim import Simulation
 
 OBSERVATION = Table(
     [

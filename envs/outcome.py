@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tca_mj.checks import some
-from tca_mj.sim import Simulation, SimulationDiverged, SimulationOverheated
+from tca_mj.drive import SimulationDiverged, SimulationOverheated
+from tca_mj.sim import Simulation
 from tca_mj.state import SimulationState
 from tca_mj.variation import Variation
 

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tca_mj.checks import door
+from tca_mj.drive import Drive, SimulationDiverged, Timestep
 from tca_mj.envs.hanging import CLAMP, PERIOD, TCAS, NoRest, StaticTip
 from tca_mj.envs.options import Constant, Option, Options, Setup, variation_options
 from tca_mj.envs.outcome import Verdict
@@ -18,7 +19,6 @@ from tca_mj.envs.table import Entry, Table
 from tca_mj.envs.task import SimulatedTask, TaskArguments
 from tca_mj.envs.vector import TaskVector
 from tca_mj.modules.bending import BendingSpec
-from tca_mj.sim import Drive, SimulationDiverged, Timestep
 
 _SIDES = (1, 3, 2)  # TCAs, left and right of the x-z plane swapped
 

@@ -10,6 +10,7 @@ from typing import Any, ClassVar, Unpack
 import numpy as np
 
 from tca_mj.checks import door
+from tca_mj.drive import Timestep
 from tca_mj.envs.gaits import OBSERVATION as OF_ONE
 from tca_mj.envs.gaits import SHAPES, SPREAD, TASKS
 from tca_mj.envs.options import Constant, Option, Options, Setup
@@ -19,7 +20,6 @@ from tca_mj.envs.task import TaskArguments
 from tca_mj.envs.tetrapod import TetrapodGait
 from tca_mj.envs.vector import TaskVector
 from tca_mj.robots.tetrapod import TetrapodSpec
-from tca_mj.sim import Timestep
 
 # The bend tells the shapes apart, and is therefore scaled to what it is: from flat to the U it goes
 # from -0.8 to 0.9.

@@ -11,11 +11,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tca_mj.checks import Angle, Positive, door, number, require_one_of, row
+from tca_mj.drive import Timestep
 from tca_mj.model.part import Part
 from tca_mj.model.scene import scene
 from tca_mj.robots.tetrapod import LEGS, TetrapodSpec, rigid_tetrapod, set_rigid_bend, tetrapod
 from tca_mj.robots.tetrapod_fine import fine_tetrapod
-from tca_mj.sim import Simulation, Timestep
+from tca_mj.sim import Simulation
 
 Array = NDArray[np.float64]
 

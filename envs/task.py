@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tca_mj.checks import door, quantity, require_one_of, shown, whole
+from tca_mj.drive import Drive, SimulationDiverged, Timestep
 from tca_mj.envs.options import Option, Options, Setup, variation_of, variation_options
 from tca_mj.envs.outcome import (
     Action,
@@ -35,7 +36,7 @@ from tca_mj.envs.table import Entry, Table, commands
 from tca_mj.model.part import Part
 from tca_mj.record.render import Offscreen, Pixels, colour_tendons
 from tca_mj.registry import ControlPeriod
-from tca_mj.sim import Drive, Simulation, SimulationDiverged, Timestep
+from tca_mj.sim import Simulation
 from tca_mj.state import get_state, set_state
 from tca_mj.tca import (
     Estimate,

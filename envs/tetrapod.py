@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from tca_mj.assets import mjcf
 from tca_mj.checks import door, number, require_one_of
+from tca_mj.drive import Drive, Timestep
 from tca_mj.envs.command import (
     Command,
     Following,
@@ -31,7 +32,6 @@ from tca_mj.envs.table import Table
 from tca_mj.envs.task import SimulatedTask, TaskArguments, parts
 from tca_mj.envs.vector import TaskVector
 from tca_mj.robots.tetrapod import LEGS, TetrapodSpec
-from tca_mj.sim import Drive, Timestep
 
 # Updates of the TCAs in a control step, at least. With one in every physics step the searched walk
 # is 1.0 % slower, the other gaits 0.3 % or less; with a single one the scripted walk is 1.2 %

@@ -14,11 +14,11 @@ import imageio.v3 as imageio
 import numpy as np
 
 from tca_mj.agents.scripts.reach import ReachPolicy
+from tca_mj.drive import SimulationDiverged
 from tca_mj.envs.hanging import NoRest, StaticTip
 from tca_mj.envs.reach import ACTION, BendReach
 from tca_mj.modules.bending import BendingSpec
 from tca_mj.pages import folder_of_pictures
-from tca_mj.sim import SimulationDiverged
 
 Act = Callable[[Any], Any]
 SEEDS = range(20)

@@ -1,5 +1,6 @@
 from tca_mj.actuation import Group, MixedBank, MixedState, Muscle, MuscleBank
 from tca_mj.batch import SimulationBatch
+from tca_mj.drive import Drive, Haste, SimulationDiverged, SimulationOverheated
 from tca_mj.envs.vector import register_task
 from tca_mj.exported import export, frozen
 from tca_mj.model.build import add_tca, stage
@@ -33,7 +34,7 @@ from tca_mj.robots.morphing_grid import MorphingGridSpec, morphing_grid
 from tca_mj.robots.tetrapod import TetrapodSpec, rigid_tetrapod, tetrapod
 from tca_mj.rod.beam import BeamSpec, Outline
 from tca_mj.routes import Helix, Route, UTurn, leg_length, parallel
-from tca_mj.sim import Drive, Haste, Simulation, SimulationDiverged, SimulationOverheated
+from tca_mj.sim import Simulation
 from tca_mj.state import SimulationState, get_state, set_state
 from tca_mj.tca.bank import TcaBank
 from tca_mj.tca.catalogue import CATALOGUE

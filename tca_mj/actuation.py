@@ -21,7 +21,17 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tca_mj.checks import Array, within
-from tca_mj.tca import HeatSpec, Pull, Supply, TcaBank
+from tca_mj.tca import (
+    CalibrationError,
+    CreepSpec,
+    HeatSpec,
+    LawChoice,
+    Pull,
+    Supply,
+    TcaBank,
+    TcaSpec,
+    aged,
+)
 from tca_mj.tca.bank import Signal as Signal
 
 AMBIENT = 25.0  # temperature of what has none of its own [°C]
@@ -301,3 +311,33 @@ def _picked(value: Any, places: NDArray[np.int64]) -> Any:
         return replace(value, **picked)
     return value[..., places] if isinstance(value, np.ndarray) and value.ndim else value
 
+
+def bank_of(
+    specs: Sequence[Any], law: LawChoice, ambient: float, creep: CreepSpec | None, cycles: float
+) -> Any:
+    """The bank of all muscles."""
+    kinds: dict[type, list[int]] = {}
+    for place, spec in enumerate(specs):
+        kinds.setdefault(type(spec), []).append(place)
+    banks = []
+    for kind, places in kinds.items():
+        own = [specs[i] for i in places]
+        if kind is TcaSpec:
+            banks.append((np.array(places), _tca_bank(own, law, ambient, creep, cycles)))
+        else:
+            banks.append((np.array(places), kind.bank(own)))  # type: ignore[attr-defined]
+    if len(banks) == 1 and isinstance(banks[0][1], TcaBank):
+        return banks[0][1]
+    return MixedBank(specs, banks)
+
+
+def _tca_bank(
+    specs: Sequence[TcaSpec], law: LawChoice, ambient: float, creep: CreepSpec | None, cycles: float
+) -> TcaBank:
+    surrounded = tuple(replace(spec, ambient=ambient) for spec in specs)
+    if cycles > 0.0:
+        surrounded = tuple(aged(spec, cycles, creep or CreepSpec()) for spec in surrounded)
+    try:
+        return TcaBank(surrounded, law, creep)
+    except CalibrationError:
+        return TcaBank(surrounded, "rod", creep)

@@ -25,10 +25,11 @@ from numpy.typing import NDArray
 
 from tca_mj.checks import Count, door, instance, shown
 from tca_mj.couple import Inputs, advance, measure, write
+from tca_mj.drive import DIVERGENCE, Drive, SimulationDiverged
 from tca_mj.forks import Held, keep_for_ever
 from tca_mj.model.smooth import SmoothBody, Strained
 from tca_mj.model.spines import Spines
-from tca_mj.sim import DIVERGENCE, Drive, Simulation, SimulationDiverged
+from tca_mj.sim import Simulation
 from tca_mj.tca import CoilSolveError, Pull, TcaBank, TcaMelted, TcaState
 from tca_mj.tca.arrays import stacked, unstacked
 

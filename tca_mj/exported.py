@@ -15,9 +15,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from tca_mj.checks import door, floats, shown
+from tca_mj.drive import SimulationDiverged
 from tca_mj.files import write_whole
 from tca_mj.model.part import Part
-from tca_mj.sim import Simulation, SimulationDiverged
+from tca_mj.sim import Simulation
 
 REST = "rest"  # the keyframe of the rest that was found
 _STILL = 1e-2  # velocity with which MuJoCo's solver lets a joint creep at rest [rad/s, m/s]

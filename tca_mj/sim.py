@@ -11,8 +11,8 @@ do the work that this length says: see ``tca_mj.model.smooth``.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from typing import Annotated, Any
 
@@ -20,9 +20,8 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tca_mj.actuation import Group, MixedBank, Signal, muscle_group
+from tca_mj.actuation import Group, Signal, bank_of, muscle_group
 from tca_mj.checks import (
-    Checked,
     NotNegative,
     Numbers,
     Positive,
@@ -34,6 +33,18 @@ from tca_mj.checks import (
     text,
 )
 from tca_mj.couple import Inputs, Writes, advance, measure, write
+from tca_mj.drive import (
+    DIVERGENCE,
+    Ambient,
+    Haste,
+    SimulationDiverged,
+    SimulationOverheated,
+    Timestep,
+    whole_number,
+)
+from tca_mj.drive import (
+    Drive as Drive,
+)
 from tca_mj.model.build import stage
 from tca_mj.model.mujoco_warnings import count_warnings
 from tca_mj.model.part import Part
@@ -41,18 +52,14 @@ from tca_mj.model.smooth import SmoothBody
 from tca_mj.model.spines import Spines
 from tca_mj.rod.shape import bend
 from tca_mj.tca import (
-    CalibrationError,
     CoilSolveError,
     CreepingState,
     CreepSpec,
     LawChoice,
     Pull,
     Supply,
-    TcaBank,
     TcaMelted,
-    TcaSpec,
     TcaState,
-    aged,
 )
 
 # Physics steps between two updates of the TCAs, and in one call: MuJoCo cannot be interrupted in
@@ -61,92 +68,8 @@ MOST_SUBSTEPS, MOST_STEPS = 10_000, 1_000_000
 # Physics steps after which is looked whether the state has diverged: one that is no number takes
 # the solver all its iterations, of a robot with many contacts half a second for each step.
 _RUN = 5
-# 0.1 s is longer than a soft body swings, a microsecond shorter than any contact.
-Timestep = Annotated[float, partial(number, at_least=1e-6, at_most=0.1, unit="s")]
-# Surroundings in which TCAs and spines are cold, and were tried.
-Ambient = Annotated[float, partial(number, at_least=-40.0, at_most=60.0, unit="°C")]
-
 _SLIDE = int(mujoco.mjtJoint.mjJNT_SLIDE)
 _SNAPPING = int(mujoco.mjtIntegrator.mjINT_IMPLICITFAST)
-
-# Warnings after which MuJoCo has reset the state by itself.
-DIVERGENCE = {
-    int(warning): str(warning).rsplit("_", 1)[-1]
-    for warning in (
-        mujoco.mjtWarning.mjWARN_BADQPOS,
-        mujoco.mjtWarning.mjWARN_BADQVEL,
-        mujoco.mjtWarning.mjWARN_BADQACC,
-        mujoco.mjtWarning.mjWARN_BADCTRL,
-    )
-}
-
-
-class SimulationDiverged(ArithmeticError):
-    """The simulation left the range of finite, physical states."""
-
-
-class SimulationOverheated(SimulationDiverged):
-    """A TCA would be hotter than the temperature at which its fibre melts."""
-
-
-@dataclass(frozen=True, kw_only=True, slots=True, eq=False)
-class Drive:
-    """What drives a simulation, constant over a step; checked by ``Simulation.step``.
-
-    Attributes:
-        command: Command of the TCAs, in the unit of the simulation's supply, shape (n,).
-        voltage: Voltage of the spines' heaters, shape (spines.n,) or one for all [V].
-        fan: Whether air is blown at the spines, shape (spines.n,) or one for all.
-    """
-
-    command: NDArray[np.float64]
-    voltage: ArrayLike = 0.0
-    fan: ArrayLike = False
-
-
-@dataclass(frozen=True, kw_only=True, slots=True)
-class Haste(Checked):
-    """Smaller steps while something of a robot snaps beside something that it can strike.
-
-    Strikes ask for them: what snaps through free air takes the simulation's own. Beside something
-    is what MuJoCo lists a contact for, which it does from the geoms' ``gap`` on. The integrator is
-    ``implicitfast`` then, which does not damp what moves that fast.
-
-    Attributes:
-        speed: Speed of a hinge or slide above which it snaps [rad/s, m/s].
-        timestep: Physics time step then [s].
-        tca_period: Time between two updates of the TCAs then, a multiple of ``timestep`` and a
-            whole fraction of the simulation's own [s].
-
-    Raises:
-        ValueError: If a number is out of range, or the period no multiple.
-    """
-
-    speed: Positive
-    timestep: Timestep
-    tca_period: Positive
-
-    def __post_init__(self) -> None:
-        Checked.__post_init__(self)
-        _whole_number("tca_period", self.tca_period, "timestep", self.timestep)
-
-    @property
-    def substeps(self) -> int:
-        """Physics steps between two updates."""
-        return round(self.tca_period / self.timestep)
-
-
-def _whole_number(name: str, whole: float, of: str, part: float) -> int:
-    """How many times a time is in another one.
-
-    Raises:
-        ValueError: If that is no positive whole number.
-    """
-    count = round(whole / part)
-    if count < 1 or abs(count * part - whole) > 1e-9:
-        raise ValueError(f"{name} must be a positive multiple of {of} {part} s, got {whole}")
-    return count
-
 
 class Simulation:
     """A built part with its TCAs, in motion.
@@ -218,9 +141,9 @@ class Simulation:
                 there is no such ``law``, or MuJoCo cannot compile the part.
         """
         number("tca_period", tca_period, at_most=MOST_SUBSTEPS * timestep, unit="s")
-        substeps = _whole_number("tca_period", tca_period, "timestep", timestep)
+        substeps = whole_number("tca_period", tca_period, "timestep", timestep)
         if haste is not None:
-            _whole_number("tca_period", tca_period, "haste.tca_period", haste.tca_period)
+            whole_number("tca_period", tca_period, "haste.tca_period", haste.tca_period)
         self.haste = haste
         count_warnings()
         part.spec.option.timestep = timestep
@@ -235,7 +158,7 @@ class Simulation:
         self.tca_period = tca_period
         self.chains = part.members
         self.tca_names = tuple(tca.name for tca in part.tcas)
-        self.bank = _bank(
+        self.bank = bank_of(
             [tca.spec for tca in part.tcas], law, ambient, creep, cycles
         )
         self.bank.supply = supply or Supply()
@@ -667,34 +590,3 @@ class Simulation:
 def _steadiness(timestep: float, tca_period: float) -> float:
     """Time over which the damping of taut tendons is made [s]."""
     return max(timestep, 0.4 * tca_period)
-
-
-def _bank(
-    specs: Sequence[Any], law: LawChoice, ambient: float, creep: CreepSpec | None, cycles: float
-) -> Any:
-    """The bank of all muscles."""
-    kinds: dict[type, list[int]] = {}
-    for place, spec in enumerate(specs):
-        kinds.setdefault(type(spec), []).append(place)
-    banks = []
-    for kind, places in kinds.items():
-        own = [specs[i] for i in places]
-        if kind is TcaSpec:
-            banks.append((np.array(places), _tca_bank(own, law, ambient, creep, cycles)))
-        else:
-            banks.append((np.array(places), kind.bank(own)))  # type: ignore[attr-defined]
-    if len(banks) == 1 and isinstance(banks[0][1], TcaBank):
-        return banks[0][1]
-    return MixedBank(specs, banks)
-
-
-def _tca_bank(
-    specs: Sequence[TcaSpec], law: LawChoice, ambient: float, creep: CreepSpec | None, cycles: float
-) -> TcaBank:
-    surrounded = tuple(replace(spec, ambient=ambient) for spec in specs)
-    if cycles > 0.0:
-        surrounded = tuple(aged(spec, cycles, creep or CreepSpec()) for spec in surrounded)
-    try:
-        return TcaBank(surrounded, law, creep)
-    except CalibrationError:
-        return TcaBank(surrounded, "rod", creep)

@@ -16,7 +16,8 @@ from typing import Annotated, Any, TypeVar, get_type_hints
 import numpy as np
 
 from tca_mj.checks import Checked, bounds, door, instance, number, require_one_of, shown
-from tca_mj.sim import Ambient, Simulation
+from tca_mj.drive import Ambient
+from tca_mj.sim import Simulation
 from tca_mj.smp import HeaterSpec
 from tca_mj.tca import HeatSpec
 

@@ -458,6 +458,7 @@ def _samples() -> dict[Any, Callable[[], Any]]:
     from tca_mj.agents.scripts.tetrapod import WALK
     from tca_mj.agents.train.config import TrainConfig
     from tca_mj.batch import SimulationBatch
+    from tca_mj.drive import Drive
     from tca_mj.envs.hanging import StaticTip
     from tca_mj.envs.options import Constant, Option, Options
     from tca_mj.envs.table import Entry, Table
@@ -470,7 +471,7 @@ def _samples() -> dict[Any, Callable[[], Any]]:
     from tca_mj.record.render import Closing, Watched
     from tca_mj.rod import BeamSpec, Outline, Segment
     from tca_mj.routes import Helix, Route, UTurn
-    from tca_mj.sim import Drive, Simulation
+    from tca_mj.sim import Simulation
     from tca_mj.smp.lumped import LumpedModule
     from tca_mj.state import SimulationState, get_state
     from tca_mj.tca.identify import (

@@ -40,6 +40,7 @@ LAYER_OF = {
     "batch": "sim",
     "state": "sim",
     "couple": "sim",
+    "drive": "sim",
     "actuation": "control",
     "exported": "sim",
     "testing": "agents",

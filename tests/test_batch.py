@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 
 from tca_mj.batch import SimulationBatch
+from tca_mj.drive import Drive, SimulationDiverged
 from tca_mj.model.part import Part, new_spec
 from tca_mj.modules.bending import bending_module
 from tca_mj.modules.morphing import MorphingSpec, morphing_module
-from tca_mj.sim import Drive, Simulation, SimulationDiverged
+from tca_mj.sim import Simulation
 from tca_mj.variation import Nominal, Variation
 
 STATE = int(mujoco.mjtState.mjSTATE_INTEGRATION)

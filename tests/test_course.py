@@ -357,3 +357,12 @@ def test_a_spine_that_is_heated_for_long_is_too_hot_and_has_not_diverged():
     assert 160.0 < info["spine_temperature"][1] < 165.0 < OBSERVATION.space.high[46]
     assert info["cost"] == 1.0
     assert 50 < step < 150
+
+
+@pytest.mark.parametrize("name", ["scripted", "searched", "specialists", "shapes"])
+def test_the_quick_course_is_walked_by_name(name):
+    """As the command on the page has it: the task is made with a fan, and its script begins."""
+    policy = f"tca_mj.agents.scripts.course_quick:{name}"
+    summary = play("TCA/TetrapodCourse-v0", policy, seed=0, max_duration=1.0, progress=False)
+    assert summary["ending"] == "stopped after 1 s"
+    assert summary["phases"][0]["name"] == "crawl"

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from tca_mj.batch import SimulationBatch
+from tca_mj.drive import Drive
 from tca_mj.modules.bending import bending_module
-from tca_mj.sim import Drive, Simulation
+from tca_mj.sim import Simulation
 from tca_mj.state import get_state, set_state
 from tca_mj.tca import (
     CATALOGUE,

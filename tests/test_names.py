@@ -23,8 +23,9 @@ import tca_mj
 # ``tca_mj.testing`` (tasks of one's own).
 INTERNAL = {
     "tca_mj": {
-        "actuation": "muscle_group", "bench": "*", "checks": "*", "couple": "*", "files": "*",
-        "forks": "*", "hints": "*", "lazy": "*", "machine": "*", "pages": "*", "quadrature": "*",
+        "actuation": "bank_of muscle_group", "bench": "*", "checks": "*", "couple": "*",
+        "drive": "Ambient DIVERGENCE Timestep whole_number", "files": "*", "forks": "*",
+        "hints": "*", "lazy": "*", "machine": "*", "pages": "*", "quadrature": "*",
         "registry": "Demo recipes", "routes": "require_route", "testing": "*",
     },
     "tca_mj.smp": {"damage": "damaging", "fixing": "with_glass", "heater": "heated"},

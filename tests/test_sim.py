@@ -7,6 +7,7 @@ import mujoco
 import numpy as np
 import pytest
 
+from tca_mj.drive import SimulationDiverged, SimulationOverheated
 from tca_mj.model import settle
 from tca_mj.model.chain import add_chain
 from tca_mj.model.part import Part, new_spec
@@ -14,7 +15,7 @@ from tca_mj.model.tendon import route_passes, route_tca
 from tca_mj.modules.bending import BendingSpec, bending_module
 from tca_mj.modules.finger import finger_pair
 from tca_mj.routes import Helix, leg_length
-from tca_mj.sim import Simulation, SimulationDiverged, SimulationOverheated
+from tca_mj.sim import Simulation
 from tca_mj.tca import CATALOGUE, MATERIALS, HeatStep, Supply, Thermostat
 
 

@@ -20,8 +20,8 @@ from scipy.optimize import lsq_linear
 
 from tca_mj.agents.model.dynamics import TaskModel
 from tca_mj.checks import Array, Checked, Count, NotNegative, Positive, Positives, door, whole
+from tca_mj.drive import SimulationDiverged
 from tca_mj.envs.task import SimulatedTask
-from tca_mj.sim import SimulationDiverged
 
 Rows = dict[str, Array]
 Output = Callable[[Rows], Array]

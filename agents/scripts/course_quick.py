@@ -13,6 +13,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
+import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
@@ -164,26 +165,33 @@ class Learned:
         return self._asked.copy()
 
 
-def scripted(task: TetrapodCourse) -> CourseWalker:
+def scripted(env: gym.Env[Any, Any]) -> CourseWalker:
     """The course in less time with the scripted gaits."""
-    return CourseWalker(task, quick(task.places, SCRIPTED))
+    return _walker(env, SCRIPTED)
 
 
-def searched(task: TetrapodCourse) -> CourseWalker:
+def searched(env: gym.Env[Any, Any]) -> CourseWalker:
     """With the searched crawl and walk that come with the package."""
     found = {gait: SavedPolicy.read(find(f"tetrapod-{gait}")).gait for gait in ("crawl", "walk")}
-    gaits = SCRIPTED | {gait: known for gait, known in found.items() if known is not None}
-    return CourseWalker(task, quick(task.places, gaits))
+    return _walker(env, SCRIPTED | {gait: known for gait, known in found.items() if known})
 
 
-def specialists(task: TetrapodCourse) -> CourseWalker:
+def specialists(env: gym.Env[Any, Any]) -> CourseWalker:
     """With the gaits that were learned each by its own."""
-    return CourseWalker(task, quick(task.places, LEARNED), Learned(task, SPECIALISTS))
+    return _walker(env, LEARNED, SPECIALISTS)
 
 
-def shapes(task: TetrapodCourse) -> CourseWalker:
+def shapes(env: gym.Env[Any, Any]) -> CourseWalker:
     """With the one policy that has learned all shapes."""
-    return CourseWalker(task, quick(task.places, LEARNED), Learned(task, SHAPES))
+    return _walker(env, LEARNED, SHAPES)
+
+
+def _walker(
+    env: gym.Env[Any, Any], gaits: Mapping[str, Any], policies: Mapping[str, str] | None = None
+) -> CourseWalker:
+    task: Any = env.unwrapped
+    learned = None if policies is None else Learned(task, policies)
+    return CourseWalker(task, quick(task.places, gaits), learned)
 
 
 for _maker in (scripted, searched, specialists, shapes):

@@ -25,9 +25,9 @@ from tca_mj.certify.cases import (
 )
 from tca_mj.certify.rest import Rest
 from tca_mj.certify.subjects import SUBJECTS, Subject
+from tca_mj.drive import SimulationDiverged
 from tca_mj.model import NotSettledError
 from tca_mj.rod import RodSolveError
-from tca_mj.sim import SimulationDiverged
 from tca_mj.tca import TcaSpec
 
 POSITION, ROTATION = 0.01, np.radians(2.0)  # what a default number of nodes is allowed
