@@ -92,21 +92,23 @@ def summary(cases: list[dict]) -> list[str]:
     def row(name: str, every: list[dict]) -> list[str]:
         good = [each for each in every if each["state"] == "identified"]
         if not good:
-            return [name, f"0 of {len(every)}", "", "", "", ""]
+            return [name, f"0 of {len(every)}", "", "", "", "", ""]
         inside = [each["interval"][0] <= each["truth"] <= each["interval"][1] for each in good]
         wide = [(each["interval"][1] - each["interval"][0]) / (3.92 * each["bound"])
                 for each in good]  # fmt: skip
         size = [each["bound"] / abs(each["truth"]) for each in good]
+        off = np.array([(each["value"] - each["truth"]) / each["bound"] for each in good])
         return [name, f"{len(good)} of {len(every)}", f"{100.0 * np.mean(inside):.1f} %",
-                f"{100.0 * np.median(size):.2g} %", f"{np.median(wide):.2f}",
-                f"{max(wide):.2f}"]  # fmt: skip
+                f"{100.0 * np.median(size):.2g} %", f"{np.median(wide):.2f}", f"{max(wide):.2f}",
+                f"{off.mean():+.2f} ± {off.std() / math.sqrt(len(off)):.2f}"]  # fmt: skip
 
     names = list(cases[0]["constants"])
     found = {name: [each["constants"][name] for each in cases] for name in names}
     heads = ["constant", "identified", "truth inside", "error, median", "width over bound, median",
-             "largest"]  # fmt: skip
+             "largest", "off, mean, over bound"]  # fmt: skip
     rows = [row(f"`{name}`", every) for name, every in found.items()]
-    return table(heads, [*rows, row("all", [each for every in found.values() for each in every])])
+    every = row("all", [each for every in found.values() for each in every])
+    return table(heads, [*rows, [*every[:-1], ""]])
 
 
 def gains() -> list[str]:
@@ -159,6 +161,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--out", type=Path, default=Path("runs/identify"))
     parser.add_argument("--cases", type=int, default=CASES)
+    parser.add_argument("--first", type=int, default=0, help="seed of the first")
     parser.add_argument("--page", action="store_true", help="write the tables into the page")
     parser.add_argument("--pictures", action="store_true", help="draw the page's pictures, too")
     asked = parser.parse_args()
@@ -166,11 +169,12 @@ def main() -> None:
     asked.out.mkdir(parents=True, exist_ok=True)
     lines = path.read_text().splitlines() if path.exists() else []
     done = {each["seed"]: each for each in map(json.loads, lines)}
-    for seed in range(asked.cases):
+    seeds = range(asked.first, asked.first + asked.cases)
+    for seed in seeds:
         if seed not in done:
             done[seed] = case(seed)
             append_whole(path, (json.dumps(done[seed]) + "\n").encode())
-    held = summary([done[seed] for seed in range(asked.cases)])
+    held = summary([done[seed] for seed in seeds])
     for mark, rows in ((HELD, held), (GAINS, gains())):
         print("\n".join(rows), end="\n\n")
         if asked.page:

@@ -38,6 +38,7 @@ INTERNAL = {
     },
     "tca_mj.tca.identify": {
         "bench": "measured", "constants": "decoded encoded known_of", "data": "SHOWN", "fit": "*",
+        "latent": "*",
         "predict": "*", "reporting": "picture_name result",
     },
     "tca_mj.tca.design": {

@@ -1,6 +1,6 @@
 """Constants of a TCA by least squares over several sets of measurements, with their errors.
 
-What is minimised is the sum of squared residuals over their errors (``predict.weighed``), each set
+What is minimised is the sum of squared residuals over their errors (``latent.weighed``), each set
 with a factor on the stated errors that its own residuals give, plus what is known of each constant
 beforehand, ``Constant.width``. The latter is so little that it moves no constant that the data
 identify, and makes the covariance of all of them, the unidentified too, a finite one: a constant is
@@ -37,6 +37,7 @@ from tca_mj.tca.identify.constants import (
     with_constants,
 )
 from tca_mj.tca.identify.data import Data
+from tca_mj.tca.identify.latent import weighed
 from tca_mj.tca.identify.predict import (
     Law,
     Muscle,
@@ -44,19 +45,20 @@ from tca_mj.tca.identify.predict import (
     has_zero,
     noise_of,
     outcomes,
-    weighed,
 )
 from tca_mj.tca.laws.coil import Spin
 from tca_mj.tca.laws.rod import CoilRods
 from tca_mj.tca.laws.statics import hanging_length
 from tca_mj.tca.spec import TcaSpec
 
+CLEAR = 10.0  # difference of Akaike's criterion, or of squares, that is no chance any more
 SHARE = 0.2  # of the width beforehand that the data may leave of a constant they identify
 _STEP = 1e-5  # of differences, over the width
 _ROUNDS = 3  # of fits after a rough one, each with the factors that the last one gave
 _CHANGE = 0.02  # of the factors, below which there is no other
 _IMPOSSIBLE = 1e6  # residual where the laws have no answer
-_PROFILED, _NEAR = 3, 0.15  # steps of a profile; one that is followed by none
+_PROFILED, _NEAR = 30, 0.02  # steps of a profile at most; how near to its end it is to come [1]
+_FAR = 25.0  # rise of a profile, over that of its end, from which on a step was too long
 _CONTACT = ("minimum_length", "linear_shortest")
 _APART = 0.9  # of the shortest length: there no coils touch
 _FEW = 20  # rows of a set, below which nothing is said of their order
@@ -225,29 +227,45 @@ class Fit:
         return likely + 2.0 * len(self.x)
 
     def interval(self, name: str) -> tuple[float, float]:
-        """95 % of a number by the profile of the likelihood, in its code.
+        """95 % of a number by the profile of the likelihood, in its code."""
+        j = self.problem.names.index(name)
+        return self._end(j, -1.0), self._end(j, 1.0)
 
-        Newton's steps from the normal interval, with the slopes of the optimum.
+    def _end(self, j: int, sign: float) -> float:
+        """Where the sum of squares, least over all other numbers, has grown by the square of the
+        quantile.
+
+        Gauss and Newton's steps over the others and a secant's along the number, with the slopes
+        of the optimum, which every step mends by what it has seen (Broyden, in units of the
+        errors). What no datum feels stays: coils that do not touch are not made to.
         """
-        problem, j = self.problem, self.problem.names.index(name)
-        rest = np.arange(len(self.x)) != j
-        slopes = self.slopes[:, rest]
-        inner = np.linalg.inv(slopes.T @ slopes)
-        best = float(np.sum(problem.residuals(self.x, self.factors) ** 2))
-        along = self.covariance[:, j] / self.deviations[j]
-        found = []
-        for sign in (-1.0, 1.0):
-            z = self.quantile
-            for _ in range(_PROFILED):
-                point = self.x + sign * z * along
-                point[rest] -= inner @ (slopes.T @ problem.residuals(point, self.factors))
-                rise = float(np.sum(problem.residuals(point, self.factors) ** 2)) - best
-                further = min(max(self.quantile / math.sqrt(max(rise, 1e-12)), 0.5), 2.0)
-                z *= further
-                if abs(further - 1.0) < _NEAR:
-                    break
-            found.append(float(self.x[j] + sign * z * self.deviations[j]))
-        return found[0], found[1]
+        problem, slopes = self.problem, self.slopes.copy()
+        metric = slopes.T @ slopes
+        rest = slopes[: problem.size].any(axis=0) & (np.arange(len(self.x)) != j)
+        point, seen = self.x, problem.residuals(self.x, self.factors)
+        best, goal = float(seen @ seen), self.quantile**2
+        away = self.quantile * float(self.deviations[j])
+        step = np.where(rest, sign * away * self.covariance[:, j] / self.covariance[j, j], 0.0)
+        step[j] = sign * away
+        for _ in range(_PROFILED):
+            there = problem.residuals(point + step, self.factors)
+            if float(there @ there) > best + _FAR * goal:  # a bend, or no answer: less far
+                step, away = 0.5 * step, away - 0.5 * sign * float(step[j])
+                continue
+            along = metric @ step
+            slopes += np.outer(there - seen - slopes @ step, along) / float(step @ along)
+            point, seen = point + step, there
+            q, r = np.linalg.qr(slopes[:, rest])
+            gain = q.T @ seen
+            rise = float(seen @ seen) - float(gain @ gain) - best
+            further = min(max(self.quantile / math.sqrt(max(rise, 1e-12)), 0.5), 2.0)
+            if float(gain @ gain) < _NEAR * goal and abs(further - 1.0) < _NEAR:
+                return float(self.x[j] + sign * away * further)
+            step = np.zeros(len(self.x))
+            step[j] = sign * away * (further - 1.0)
+            step[rest] = -np.linalg.solve(r, gain + q.T @ slopes[:, j] * step[j])
+            away *= further
+        return float(self.x[j] + sign * away)
 
 
 def fitted(problem: Problem, start: Array | None = None) -> Fit:
@@ -281,7 +299,7 @@ def fitted(problem: Problem, start: Array | None = None) -> Fit:
         apart = _without_contact(problem, x, scales, j)
         costs = [float(np.sum(problem.residuals(each, scales)[: problem.size] ** 2))
                  for each in (x, apart)]  # fmt: skip
-        if costs[1] < costs[0] + quantile**2:
+        if costs[1] < costs[0] + CLEAR:
             x, slopes = apart, problem.slopes(apart, scales)
     covariance = np.asarray(np.linalg.inv(slopes.T @ slopes), dtype=np.float64)
     return Fit(problem, x, covariance, pure, scales, slopes, quantile)
@@ -290,8 +308,8 @@ def fitted(problem: Problem, start: Array | None = None) -> Fit:
 def _without_contact(problem: Problem, x: Array, scales: Array, j: int) -> Array:
     """The best numbers, but for the length of contact, the j-th, if no coils touch.
 
-    A few rows by chance too long at the hot end look like contact: whether it is there is asked by
-    the likelihood, which is flat below the shortest length.
+    A few rows by chance too long at the hot end look like contact, and that is looked for in any
+    number of them. So the square of Student's quantile is too little; it counts as models do.
     """
     apart = x.copy()
     seen = [float(each.columns["length"].min()) for each in problem.data
@@ -321,12 +339,12 @@ def _scales(problem: Problem, x: Array) -> tuple[Array, Array]:
         _, residual, _ = problem.one(i, x, muscle)
         found = math.sqrt(float(np.mean(residual**2)) / (1.0 - share))
         pure.append(max(found, 1e-6))
-        ordered = residual[_order(data)]
-        grown.append(pure[-1] * math.sqrt(max(map(_fewer, ordered.T))))
+        ordered = residual[side_by_side(data)]
+        grown.append(pure[-1] * math.sqrt(max(map(fewer, ordered.T))))
     return np.array(pure), np.array(grown)
 
 
-def _order(data: Data) -> NDArray[np.int64]:
+def side_by_side(data: Data) -> NDArray[np.int64]:
     """The rows of a set side by side: over time, or under each load by what was varied."""
     if data.stepped:
         return np.argsort(data.columns["time"], kind="stable")
@@ -336,7 +354,7 @@ def _order(data: Data) -> NDArray[np.int64]:
     return np.lexsort(keys) if keys else np.arange(data.rows)
 
 
-def _fewer(residual: Array) -> float:
+def fewer(residual: Array) -> float:
     """By how much too many rows there are, from the correlation of neighbours."""
     n, square = len(residual), float(np.sum(residual**2))
     if n < _FEW or square == 0.0:

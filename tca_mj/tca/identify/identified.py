@@ -21,7 +21,7 @@ from tca_mj.tca.identify.constants import (
     with_constants,
 )
 from tca_mj.tca.identify.data import UNITS, Data
-from tca_mj.tca.identify.fit import SHARE, Fit, Known, Problem, concerns, fitted, natural
+from tca_mj.tca.identify.fit import CLEAR, SHARE, Fit, Known, Problem, concerns, fitted, natural
 from tca_mj.tca.identify.predict import (
     LENGTHS,
     Law,
@@ -34,7 +34,7 @@ from tca_mj.tca.identify.predict import (
 from tca_mj.tca.laws.coil import Spin
 from tca_mj.tca.spec import TcaSpec
 
-_CLEAR, _EVEN = 10.0, 2.0  # differences of Akaike's criterion: no support left, and no difference
+_EVEN = 2.0  # difference of Akaike's criterion that is none; at CLEAR no support is left
 _MISFIT = 1.5  # residuals over stated errors, from which on a set is not described
 _MEASURED = 0.7  # share of a stated error that is left of what data improve
 _STEP = 1e-4  # of differences, over the width
@@ -385,8 +385,8 @@ def _verdict(compared: Sequence[Compared], best: tuple[Law, Ends | None]) -> lis
 
     first = compared[0]
     even = [named(each) for each in compared[1:] if each.criterion <= _EVEN]
-    less = [named(each) for each in compared[1:] if _EVEN < each.criterion <= _CLEAR]
-    out = [named(each) for each in compared[1:] if each.criterion > _CLEAR]
+    less = [named(each) for each in compared[1:] if _EVEN < each.criterion <= CLEAR]
+    out = [named(each) for each in compared[1:] if each.criterion > CLEAR]
     said = [f"The data support {named(first)} most."]
     said += [f"They do not tell it from {_list(even)}."] if even else []
     said += [f"Less supported: {_list(less)}."] if less else []
@@ -394,7 +394,7 @@ def _verdict(compared: Sequence[Compared], best: tuple[Law, Ends | None]) -> lis
     if first.misfit > _MISFIT:
         said.append("None of them describes all sets to within the stated errors.")
     chosen = next(each for each in compared if (each.law, each.ends) == best)
-    if chosen.criterion > _CLEAR:
+    if chosen.criterion > CLEAR:
         said.append(f"The constants are those of {named(chosen)}, which was asked for.")
     return [" ".join(said)]
 

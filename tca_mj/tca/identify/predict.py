@@ -17,12 +17,7 @@ what drives is held from each row to the next (a voltage or current of pulses, f
 time that ``duty`` says), the heat is exact and the length in equilibrium with
 it, as in the quasi-static motion of ``LoadedTcas``.
 
-What is given has errors, too. Each row's residuals r = outcome - model(given) are weighed with
-
-    V = diag(sigma_outcome^2) + sum over what is given of sigma^2 g g^T,   g = d model/d given,
-
-the effective variance, which moves with the constants: to first order this is the least square
-over all true temperatures and lengths, and without its motion slopes would come out too small.
+What is given has errors, too: see ``latent``.
 """
 
 from __future__ import annotations
@@ -219,38 +214,6 @@ def predict(data: Data, muscle: Muscle, ends: Spin, zero: float = 0.0) -> Array:
     if "resistance" in found:
         result["resistance"] = muscle.ohms(length)
     return np.stack([result[name] for name in found], axis=-1)
-
-
-def weighed(
-    data: Data, muscle: Muscle, ends: Spin, noise: Mapping[str, float], zero: float = 0.0
-) -> tuple[Array, Array, Array]:
-    """Predictions (k, c), residuals over their errors (k, c), and these errors (k, c).
-
-    The residuals of a row are made independent by the factor of its effective variance.
-    """
-    moved, found = [n for n in given_with_error(data) if noise[n] > 0.0], outcomes(data)
-    many = data
-    if moved and not data.stepped:  # the set, and below it once again for each that is off
-        columns = {
-            name: np.concatenate([each, *(each + (name == n) * noise[n] for n in moved)])
-            for name, each in data.columns.items()
-        }
-        many = replace(data, columns=columns)
-    model, *others = np.split(predict(many, muscle, ends, zero), many.rows // data.rows)
-    for name in moved if data.stepped else ():
-        columns = {**data.columns, name: data.columns[name] + noise[name]}
-        others.append(predict(replace(data, columns=columns), muscle, ends, zero))
-    variance = np.zeros((*model.shape, len(found)))
-    for i, name in enumerate(found):
-        variance[:, i, i] = noise[name] ** 2
-    for other in others:
-        slope = other - model
-        variance += slope[:, :, None] * slope[:, None, :]
-    factor = np.linalg.cholesky(variance)
-    measured = np.stack([data.columns[name] for name in found], axis=-1)
-    apart = (measured - model)[..., None]
-    residual = np.asarray(np.linalg.solve(factor, apart)[..., 0], dtype=np.float64)
-    return model, residual, np.sqrt(np.diagonal(variance, axis1=1, axis2=2))
 
 
 def _given_length(data: Data, tca: TcaSpec) -> Array:
