@@ -258,7 +258,10 @@ class Episode:
     def _begin_page(self, out: Path, speed: float) -> None:
         title = f"{self.names[0]}, {self.names[1]}, seed {self.seed}"
         interval = max(self.task.control_period, speed / _FPS)
-        self._page = WebPage(self.sim, out / PAGE, title=title, interval=interval, speed=speed)
+        self._page = WebPage(
+            self.sim, out / PAGE, title=title, interval=interval, speed=speed,
+            follow=self.task.headway() is not None,
+        )  # fmt: skip
 
     def _end_page(self) -> None:
         page, self._page = self._page, None

@@ -30,11 +30,13 @@ SETTINGS = {
     "html_use_index": False, "html_extra_path": ["replays"],
     "html_show_search_summary": False,  # it would fetch the pages, which no browser does from files
 }  # fmt: skip
-# Gaits that are replayed, by page: title, task, policy, what is left out and shown [s], and speed.
+# What is replayed, by page: title, task, policy, what is left out and shown [s], and speed.
 REPLAYS = {
+    "replay-arm": ("Pick and place", "TCA/ArmPickPlace-v0", "scripted", 0.0, 90.0, 4.0),
     "replay-crawl": ("Crawling", "TCA/TetrapodCrawl-v0", "tetrapod-crawl-sac", 12.0, 24.0, 4.0),
     "replay-walk": ("Walking", "TCA/TetrapodWalk-v0", "tetrapod-walk-sac", 12.0, 24.0, 4.0),
     "replay-shimmy": ("Shimmying", "TCA/TetrapodShimmy-v0", "tetrapod-shimmy", 12.0, 24.0, 4.0),
+    "replay-jump": ("Jumping", "TCA/Jump-v0", "scripted", 0.06, 0.3, 0.05),
 }  # fmt: skip
 # What the theme leaves out for those who listen to a page or have no mouse.
 HEARD = {
@@ -119,7 +121,7 @@ def write_pages(pages: Path) -> None:
 
 
 def replay(path: Path, task: str, policy: str, warm: float, shown: float, speed: float) -> None:
-    """Writes a page that replays a gait.
+    """Writes a page that replays an episode.
 
     Args:
         path: The page.
@@ -129,26 +131,30 @@ def replay(path: Path, task: str, policy: str, warm: float, shown: float, speed:
         shown: Time that is [s].
         speed: Simulated seconds per second.
     """
-    from tca_mj.agents.policies import arguments_of, load_policy
+    from tca_mj.agents.policies import actor, arguments_of
     from tca_mj.record import WebPage
     from tca_mj.registry import make
 
     env = make(task, disable_env_checker=True, **arguments_of(policy, task))
-    actor = load_policy(policy, env)
+    acting = actor(policy, env)
     observation, info = env.reset(seed=0)
     title = f"{task}: {policy}"
-    with WebPage(env.unwrapped.sim, path, title=title, interval=0.2, speed=speed) as page:
-        while info["time"] < warm + shown:
-            observation, *_, info = env.step(actor.act(observation))
+    sim, interval = env.unwrapped.sim, min(0.2, 0.05 * speed)
+    follow = env.unwrapped.headway() is not None
+    with WebPage(sim, path, title=title, interval=interval, speed=speed, follow=follow) as page:
+        over = False
+        while not over and info["time"] < warm + shown:
+            observation, _, ended, cut, info = env.step(acting.act(observation))
+            over = ended or cut
             if info["time"] >= warm:
-                page.frame()
+                page.frame(acting.phase)
 
 
 def write_replays(pages: Path) -> None:
     """Writes the page of the replays and what it shows."""
     blocks = [
-        "# Replays", "Gaits that come with the package, simulated when this site was built. Drag to"
-        " turn, scroll to come closer. A demo of yours leaves such a page, too:"
+        "# Replays", "Scripts and gaits that come with the package, simulated when this site was"
+        " built. Drag to turn, scroll to come closer. A demo of yours leaves such a page, too:"
         " [recordings](recording.md#in-a-browser).",
     ]  # fmt: skip
     for name, (title, *how) in REPLAYS.items():

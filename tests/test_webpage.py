@@ -30,7 +30,7 @@ def test_poses_paths_and_heat_are_those_of_the_simulation(tmp_path):
     kept = []
     with WebPage(sim, path, title="A & B </script>", interval=0.08) as page:
         for _ in range(12):
-            page.frame("heats")
+            page.frame("cold" if sim.time == 0.0 else "heats")
             tips = sim.data.wrap_xpos.reshape(-1, 3)
             first = [tips[sim.data.ten_wrapadr[t]].copy() for t in sim.tendon]
             kept.append((sim.time, sim.data.xpos.copy(), sim.temperature.copy(), first))
@@ -55,7 +55,7 @@ def test_poses_paths_and_heat_are_those_of_the_simulation(tmp_path):
         for count, point in zip(counts, first, strict=True):
             assert np.abs(ways[at] - point).max() < span.max() / 60e3
             at += count
-    assert at == len(ways) and found["labels"] == ["heats"] * 6
+    assert at == len(ways) and found["labels"] == ["cold"] + ["heats"] * 5
     text = path.read_text("utf-8")
     assert "<h1>A &amp; B &lt;/script&gt;</h1>" in text
     assert not re.search(r"https?://|<link|src=|import\(|fetch\(", text)

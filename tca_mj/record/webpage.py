@@ -40,7 +40,8 @@ class WebPage(Closing):
                 page.frame()
 
     The page is written at the end, also when that comes by an exception. It reads and never changes
-    the simulation. Planes are drawn as ground, TCAs as coils that redden with heat.
+    the simulation. Planes are drawn as ground, TCAs as coils that redden with heat, other tendons
+    as they are.
     """
 
     @door
@@ -56,7 +57,7 @@ class WebPage(Closing):
             title: What stands above it.
             interval: Time between two kept frames; calls of ``frame`` in between are not kept [s].
             speed: Simulated seconds per second, until the spectator says another [1].
-            follow: Whether the camera goes along with what moves.
+            follow: Whether the camera goes along with what moves; else all of the way is in view.
 
         Raises:
             ValueError: If an argument is not of its kind, or the ending is another.
@@ -70,6 +71,9 @@ class WebPage(Closing):
         self._bodies = [b for b in body_paths(model) if b == 0 or moving[b]]
         fixed = [b for b in body_paths(model) if b != 0 and not moving[b]]
         self._meshes = [_body(model, simulation.data, b, fixed) for b in self._bodies]
+        tcas = [int(tendon) for tendon in simulation.tendon]
+        others = (t for t in range(model.ntendon) if t not in tcas and _seen(model, t))
+        self._tendons = [*tcas, *others]
         self._times: list[float] = []
         self._poses: list[Array] = []
         self._paths: list[list[Array]] = []
@@ -103,7 +107,7 @@ class WebPage(Closing):
         points = data.wrap_xpos.reshape(-1, 3)
         self._paths.append([
             points[data.ten_wrapadr[t] : data.ten_wrapadr[t] + data.ten_wrapnum[t]].copy()
-            for t in simulation.tendon
+            for t in self._tendons
         ])  # fmt: skip
         self._heat.append(simulation.temperature.copy())
         self._labels.append(label)
@@ -123,7 +127,10 @@ class WebPage(Closing):
         ends = np.concatenate([poses[..., :3].reshape(-1, 3), ways])
         low, high = ends.min(axis=0), ends.max(axis=0)
         span = np.maximum(high - low, 1e-6)
-        model, tendons = self._simulation.model, list(self._simulation.tendon)
+        if not self._about["follow"]:
+            size = max(self._about["size"], float(np.linalg.norm(span)))
+            self._about |= {"centre": (0.5 * (low + high)).tolist(), "size": size}
+        model, tendons = self._simulation.model, self._tendons
         counts = [[len(way) for way in each] for each in self._paths]
         facts = {
             **self._about, "low": low.tolist(), "span": span.tolist(),
@@ -134,7 +141,9 @@ class WebPage(Closing):
             "counts": counts, "ways": _small((ways - low) / span * 2.0 - 1.0),
             "widths": [float(model.tendon_width[t]) for t in tendons],
             "lengths": [float(model.tendon_length0[t]) for t in tendons],
-            "heat": np.round(heat, 1).tolist(), "labels": self._labels,
+            "plain": model.tendon_rgba[tendons[heat.shape[1] :], :3].tolist(),
+            "heat": np.round(heat, 1).tolist(),
+            "labels": self._labels if len(set(self._labels)) > 1 else [],
             "scale": [COLDEST, HOTTEST], "colours": np.round(255.0 * temperature_colour(
                 np.linspace(COLDEST, HOTTEST, _STOPS))).astype(int).tolist(),
         }  # fmt: skip
@@ -142,6 +151,12 @@ class WebPage(Closing):
         data = json.dumps(facts, separators=(",", ":")).replace("</", "<\\/")
         title = html.escape(str(self._about["title"]))
         return player.replace("{{title}}", title).replace("{{facts}}", data)
+
+
+def _seen(model: mujoco.MjModel, tendon: int) -> bool:
+    """Whether a tendon that is no TCA, as a rubber band, is shown."""
+    shown = model.tendon_group[tendon] <= 2 and model.tendon_rgba[tendon, 3] > 0.0
+    return bool(shown and model.tendon_width[tendon] > 0.0)
 
 
 def _small(values: Array) -> str:
