@@ -15,6 +15,13 @@ import tutorials  # noqa: E402
 # What takes longer than seconds, and how it is made quick; nothing is compared then.
 QUICK = {
     "robot": ["(50.0, 80.0, 110.0, 130.0)=(110.0,)", "range(80)=range(40)", "--nodes 16=--nodes 6"],
+    "train": [
+        "--steps 4000=--steps 120", "in 15000 20000 25000 30000;=in 200;",
+        "in off random scripted;=in off;", "in reach scripted;=in reach;",
+        "--episodes 20=--episodes 1", "not done:=steps < 9:",
+        "--seed 1001 --out demo > demo.txt=--no-video --seed 1001 --out demo > demo.txt || true",
+        "ls demo=ls demo/rollout.rrd",
+    ],
 }
 DRAWN = ("robot", "train")  # by OpenGL
 LONG = pytest.mark.long
@@ -24,6 +31,8 @@ WRITTEN = [name for name in tutorials.NAMES if tutorials.page_of(name).exists()]
 def walked(name, *more):
     """A walk in a process of its own, as it is typed."""
     pytest.importorskip("matplotlib")
+    if name == "train":
+        pytest.importorskip("stable_baselines3")
     if name in DRAWN:
         pytest.importorskip("imageio_ffmpeg")
         try:
