@@ -16,8 +16,8 @@ from tca_mj.envs.bistable_grasp import BistableGrasp
 from tca_mj.envs.jump import Jump
 from tca_mj.robots.bistable_gripper import CLOSING, OPENING
 from tca_mj.tca.supply import Supply
+from tca_mj.validation.jumping import NOMINAL
 
-_NOMINAL = {"tca_gain": 1.0, "heat_loss": 1.0, "ambient": 25.0}
 _LONGEST = 30.0  # after which a current is called safe for good [s]
 
 
@@ -94,11 +94,11 @@ def _ready(pulse: Pulse) -> tuple[Jump | BistableGrasp, list[int], float]:
     """A task just before a pulse, the TCAs that it is for, and the sign of the bend to reach."""
     if pulse == JUMP:
         jump = Jump(action="power")
-        jump.reset(seed=0, options=_NOMINAL)
+        jump.reset(seed=0, options=NOMINAL)
         return jump, [0], 1.0
     env, policy = BistableGrasp(), BistableGraspPolicy()
     observation, _ = env.reset(
-        seed=0, options=_NOMINAL | {"object_mass": 15e-3, "hold_from": 8.0, "hold_for": 5.0}
+        seed=0, options=NOMINAL | {"object_mass": 15e-3, "hold_from": 8.0, "hold_for": 5.0}
     )
     phase, which, to = ("close", CLOSING, 1.0) if pulse == CLOSE else ("open", OPENING, -1.0)
     while True:
