@@ -199,7 +199,7 @@ def _row(
 def grid_table(out: Path | None = None) -> str:
     """Shapes of the grid; with ``out`` its picture, too."""
     spec, rows, shots = MorphingGridSpec(), [], []
-    camera = view((0.0, 0.0, -0.003), 0.185, 125.0, -28.0)
+    camera = view((0.0, 0.0, -0.003), 0.14, 125.0, -28.0)
     for name, angles in _GRIDS.items():
         course = Course(morphing_grid(spec))
         if out is not None and not shots:
@@ -265,14 +265,14 @@ def draw_twist(path: Path) -> None:
 def draw_sides(path: Path) -> None:
     """Fixed to several sides, cold and without power."""
     spec, shots = Morphing3dSpec(), []
-    camera = view((0.0, 0.0, 0.04), 0.23, 70.0, -35.0)
+    camera = view((0.0, 0.0, 0.041), 0.205, 70.0, -35.0)
     for side, angle in ((0.0, 0.0), (0.0, 90.0), (120.0, 90.0), (180.0, 90.0), (240.0, 120.0)):
         course = Course(morphing_3d_module(spec))
         if angle:
             course.soften()
             course.deform(spec.temperatures(math.radians(side), math.radians(angle)))
             course.harden()
-        shots.append(course.shot(camera, 330, 380))
+        shots.append(course.shot(camera, 380, 380))
     imageio.imwrite(path, np.concatenate(shots, axis=1))
 
 

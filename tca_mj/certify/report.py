@@ -6,7 +6,7 @@ import math
 import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict
-from itertools import cycle
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +26,7 @@ _FIELDS = ("position", "rotation")
 _SHADES = {"hanging": "#0072b2", "lying": "#d55e00", "standing": "#8a4fa3"}
 _COLOURS = ("#0072b2", "#d55e00", "#009e73", "#8a4fa3", "#56b4e9", "#b8860b", "#555555", "#cc3377",
             "#88aa00", "#003f7f", "#ff9955", "#44ccaa", "#bb99ee", "#aa7755")  # fmt: skip
+_MARKERS = "o-", "s--"  # of the first so many modules, and of as many more
 _ABREAST = 5  # modules side by side in a figure
 _FIGURES = {
     "bend": "Error of the tip's place and rotation over its bend, at the default nodes. Dashed:"
@@ -282,13 +283,14 @@ def _nodes(figure: Any, rows: Mapping[str, Sequence[Outcome]]) -> None:
     axes = figure.subplots(1, 2)
     labels = "error of the tip [1/L]", "error of its rotation [rad]"
     for axis, field, label in zip(axes, _FIELDS, labels, strict=True):
-        for colour, (name, every) in zip(cycle(_COLOURS), rows.items(), strict=False):
+        styles = product(_MARKERS, _COLOURS)
+        for (marker, colour), (name, every) in zip(styles, rows.items(), strict=False):
             nodes = np.array(TIMES) * SUBJECTS[name]().nodes[0]
             errors = np.array([each for each in _finer(every, field) if max(each) > _NOTHING])
             if errors.size:
                 drawn = np.maximum(errors, _NOTHING)
                 axis.plot(nodes, drawn.T, "-", color=colour, lw=0.6, alpha=0.4)
-                axis.plot(nodes, np.median(errors, axis=0), "o-", color=colour, label=name)
+                axis.plot(nodes, np.median(errors, axis=0), marker, color=colour, label=name)
         wide = np.array([8.0, 64.0])
         axis.plot(wide, 3e-3 * (8.0 / wide) ** 2, "k--", lw=1, label="second order")
         axis.set(xscale="log", yscale="log", xlabel="nodes of a module", ylabel=label)
