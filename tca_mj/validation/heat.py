@@ -14,11 +14,10 @@ from typing import NamedTuple
 import numpy as np
 
 from tca_mj import pages
+from tca_mj.modules.bistable import BistableSpec
 from tca_mj.smp.convection import moving_air, radiation, still_air
 from tca_mj.tca import CATALOGUE, Heating, Load, LoadedTcas, TcaBank, TcaMelted, TcaSpec
 from tca_mj.tca.dynamics.loads import Course
-from tca_mj.tca.embedding import silicone_body
-from tca_mj.tca.thermal import BodyHeat
 from tca_mj.validation.facts import Finding, finding, words
 from tca_mj.validation.race import NAMES, run
 from tca_mj.validation.sensors import SENSED, crept
@@ -32,6 +31,7 @@ LARGEST = 60.0  # displacement after 1 A for 2 s under 20 g, Sun, Section 2.2.2 
 FINGER = 6.6  # two TCAs of 45 mm, Sun, Section 4.2.2 [ohm]
 ACCELERATION = 0.2  # of 20 g at 10 and 12 V at most, Sun, Section 2.3.1 [m/s^2]
 PULSES = ((1.5, 0.8), (2.5, 0.3))  # on a TCA of 100 mm, Sun, Section 4.3.4 [A, s]
+SILICONE = BistableSpec().embedded.body  # about a TCA of the bistable finger
 _COIL = CATALOGUE["free-stroke"]
 _SENSED_MADE = 0.1335  # made length of the TCA of Table 2.3 [m]
 _MADE = CATALOGUE["free-stroke-made"].rest_length / _COIL.rest_length
@@ -134,7 +134,7 @@ def heated(candidate: Candidate) -> Heated:
         volts=(_lifted(candidate, 5.0), _lifted(candidate, 6.0)),
         acceleration=acceleration, hold=hold,
         pulses=tuple(pulse(long, *at) for at in PULSES),
-        soft=tuple(pulse(replace(long, body=finger_body(long)), *at) for at in PULSES),
+        soft=tuple(pulse(replace(long, body=SILICONE), *at) for at in PULSES),
         finger=2.0 * short.resistance_per_length * short.rest_length,
     )  # fmt: skip
 
@@ -178,12 +178,6 @@ def _lift(candidate: Candidate) -> tuple[float, float]:
     path = np.array(moved)
     rate = np.convolve(np.diff(path, 2) / dt**2, np.ones(5) / 5.0, "valid")
     return float(np.abs(rate).max()), float(tca.heat.loss) * (hot - 25.0)
-
-
-def finger_body(tca: TcaSpec) -> BodyHeat:
-    """Silicone of the bistable finger, 45 x 10 x 8 mm, with two TCAs bent through it."""
-    share = 45e-3 / (2.0 * tca.rest_length)
-    return silicone_body(tca, section=share * 80e-6, perimeter=share * 36e-3, touching=0.5)
 
 
 def pulse(tca: TcaSpec, amperes: float, seconds: float) -> float | None:

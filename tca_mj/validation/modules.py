@@ -21,7 +21,7 @@ from tca_mj.tca import CATALOGUE, HeatStep, law_at
 from tca_mj.validation.attitude import JUDGED, bent, contact_for, in_free_air
 from tca_mj.validation.bistable import findings as bistable_forces
 from tca_mj.validation.facts import Finding, finding, words
-from tca_mj.validation.heat import finger_body
+from tca_mj.validation.heat import SILICONE
 from tca_mj.validation.replay import PRINTED, Course, loaded_arm
 
 DEVIATION = 4.49  # largest standard deviation of Fig. 4.4d [deg]
@@ -198,7 +198,7 @@ def bistable() -> list[Finding]:
     1.5 s and opens.
     """
     tca = CATALOGUE["free-stroke"].of_length(0.100)
-    heat, power = replace(tca, body=finger_body(tca)).heat, np.array(1.5**2 * CUT)
+    heat, power = replace(tca, body=SILICONE).heat, np.array(1.5**2 * CUT)
     cold, off = np.array(_ROOM), np.array(0.0)
     shut, long = HeatStep.of(heat, 0.8), HeatStep.of(heat, 1.5)
     closer, closer_body, _ = shut.advance(cold, cold, power)
