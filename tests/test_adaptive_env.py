@@ -157,10 +157,11 @@ def test_heating_the_bases_tca_while_it_is_stiff_ends_the_episode(shared):
     assert info["reward_terms"]["damage"] == -10.0
 
 
-def test_the_script_morphs_by_the_resistance_and_hardens(shared):
+@pytest.mark.parametrize("name", OBJECTS)
+def test_the_script_morphs_by_the_resistance_and_hardens(shared, name):
     """Within 3° of its command once rigid; nothing of the observed angle is used."""
     policy = AdaptivePolicy()
-    observation, info = shared.reset(seed=0, options={"object": "ball", "start": 0.5})
+    observation, info = shared.reset(seed=200, options={"object": name, "start": 0.5})
     hidden = OBSERVATION.slices["angle of the base"]
     for _ in range(350):
         observation[hidden] = np.nan

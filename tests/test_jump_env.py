@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from tca_mj.agents.scripts.jump import JumpPolicy
-from tca_mj.drive import Drive, Haste
 from tca_mj.envs.jump import ACTION, OBSERVATION, Jump
 from tca_mj.robots.jumper import JumperSpec
+from tca_mj.sim import Drive, Haste
 from tca_mj.validation.jumping import NOMINAL, balance, jumped, jumper_with
 from tca_mj.validation.pulses import JUMP, endured
 

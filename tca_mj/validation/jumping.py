@@ -7,8 +7,8 @@ from typing import Any, NamedTuple
 import mujoco
 
 from tca_mj.agents.scripts.jump import JumpPolicy
-from tca_mj.drive import Haste
 from tca_mj.envs.jump import HASTE, PERIOD, TIMESTEP, Jump
+from tca_mj.sim import Haste
 
 NOMINAL = {"tca_gain": 1.0, "heat_loss": 1.0, "ambient": 25.0}  # what seeds draw otherwise
 _ALMOST = -0.55  # bend shortly before the module goes over [rad]
