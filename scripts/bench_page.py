@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from load_bandwidth import bandwidth_table
 from numpy.typing import NDArray
 
 from tca_mj.control import TcaServo, goal_temperature, pi_rest, pi_step
@@ -537,7 +538,8 @@ def pictures(out: Path) -> None:
 def main() -> None:
     out = folder_of_pictures(__doc__, Path("docs/pictures"))
     if out is None:
-        for lines in (force_table, observability_table, control_table, observer_table):
+        for lines in (force_table, observability_table, bandwidth_table, control_table,
+                      observer_table):  # fmt: skip
             print("\n".join(lines()), flush=True, end="\n\n")
     else:
         pictures(out)

@@ -42,6 +42,7 @@ from tca_mj.tca.identify import (
 )
 from tca_mj.tca.identify import fit as fit_of
 from tca_mj.tca.identify.latent import weighed
+from tca_mj.tca.identify.loops import direction
 from tca_mj.tca.identify.predict import Muscle, predict
 
 THREAD = CATALOGUE["free-stroke"]
@@ -514,3 +515,91 @@ def test_hanging_and_pulling_are_the_laws():
 def test_every_constant_says_what_would_identify_it():
     assert all(each.unit and each.meaning and each.measurement for each in CONSTANTS.values())
     assert list(constants_of(TCA)) == [name for name in CONSTANTS if not name.startswith("body")]
+
+
+# Loops.
+
+LAG = 6.0  # between heating and cooling [K]
+
+
+def looped(width, rows=120, cooling=True, time=False):
+    """Length under 0.2 N against temperature, of a TCA whose cooling lags."""
+    random, half = np.random.default_rng(5), rows // 2
+    warm = np.linspace(25.0, 130.0, half if cooling else rows)
+    warm = np.concatenate([warm, warm[::-1]]) if cooling else warm
+    way = np.where(cooling & (np.arange(rows) >= half), -1.0, 1.0)
+    length = hanging_length(TCA, np.maximum(warm - 0.5 * width * way, 20.0), 0.2, spin="free")
+    columns = {"temperature": warm + 0.5 * random.standard_normal(rows),
+               "length": length + 0.01 * length.max() * random.standard_normal(rows)}  # fmt: skip
+    columns |= {"time": 10.0 * np.arange(rows)} if time else {}
+    return Data(name="loop.csv", fixed={"load": 0.2}, ends="free", columns=columns)
+
+
+def test_a_loop_is_told_with_its_size_and_what_it_does(bench, tmp_path):
+    result = identify([*bench, looped(LAG, time=True)], KNOWN, compare=False)
+    (loop,) = result.loops
+    assert loop.name == "loop.csv" and loop.outcome == "length"
+    assert abs(loop.width - LAG) < 3.0 * loop.error and loop.error < 1.0
+    truth = hanging_length(TCA, np.linspace(25.0, 130.0, 50)[None] + np.array([[3.0], [-3.0]]), 0.2,
+                           spin="free")  # fmt: skip
+    expected = np.abs(truth[1] - truth[0]).max() / truth.max()
+    assert loop.share == pytest.approx(expected, rel=0.3)
+    # 105 K up and 105 K down in 1190 s, so half of the loop is 17 s.
+    assert loop.lag == pytest.approx(0.5 * loop.width * 1190.0 / 210.0, rel=0.05)
+    assert all(abs(each) < 0.5 for each in loop.moved.values())  # heating and cooling are even
+    said = "\n".join(result.words)
+    assert "loop.csv: heating and cooling differ by" in said
+    assert "of the full scale of length, as if the TCA, or its thermometer, lagged" in said
+    assert "moves no constant by half of its error" in said
+    assert "had it only been heated, they would be off by:" in said
+    write_identification(result, tmp_path)
+    assert json.loads((tmp_path / "report.json").read_text())["loops"][0]["width"] == loop.width
+
+
+def test_what_a_bench_that_only_heats_makes_of_a_loop_is_foretold(bench):
+    """It tells no loop, and its constants are off as ``heated`` of both branches says."""
+    both = identify([*bench, looped(LAG)], KNOWN, compare=False)
+    heated = identify([*bench, looped(LAG, cooling=False)], KNOWN, compare=False)
+    straight = identify([*bench, looped(0.0, cooling=False)], KNOWN, compare=False)
+    assert not heated.loops and not straight.loops
+    (loop,) = both.loops
+    names = heated.fit.problem.names
+    apart = (heated.fit.x - straight.fit.x) / straight.fit.deviations
+    off = dict(zip(names, apart, strict=True))
+    for name, least in (("growth_50", 1.0), ("growth_100", 2.0)):
+        assert abs(off[name]) > least
+        assert off[name] == pytest.approx(loop.heated[name], rel=0.35)
+
+
+def test_without_a_loop_none_is_told(bench, found):
+    assert found.loops == ()
+    plain = identify([*bench, looped(0.0)], KNOWN, compare=False)
+    assert plain.loops == () and "heating and cooling" not in " ".join(plain.words)
+
+
+def test_a_course_that_lags_has_a_loop(bench):
+    """Of a step of voltage: the length follows a thermometer that is 1 s behind."""
+    course = simulated_bench(TCA, rows=400, seed=2)[3]
+    assert course.name == "step.csv"
+    time, warm = course.columns["time"], course.columns["temperature"]
+    model = predict(course, Muscle(TCA, "rod", {}), "free")
+    late = np.interp(time - 0.05 * time[-1], time, model[:, 1])
+    random = np.random.default_rng(6)
+    length = late + 0.01 * late.max() * random.standard_normal(time.size)
+    lagged = replace(course, columns={**course.columns, "temperature": warm, "length": length})
+    others = [each for each in bench if each.name != course.name]
+    (loop,) = identify([*others, lagged], KNOWN, compare=False).loops
+    assert loop.width > 0.0 and loop.lag == pytest.approx(0.05 * time[-1], rel=0.6)
+
+
+@pytest.mark.parametrize(
+    ("temperature", "ways"),
+    [
+        ([25, 40, 60, 80, 60, 40], [1, 1, 1, 1, -1, -1]),
+        ([80, 60, 40, 60, 80], [-1, -1, -1, 1, 1]),
+        ([25, 30, 29, 40, 39, 60, 61], [1] * 7),  # no more than noise
+        ([25, 60, 90, 30, 60, 90, 30], [1, 1, 1, -1, 1, 1, -1]),
+    ],
+)
+def test_branches_are_found_in_the_order_of_rows(temperature, ways):
+    assert direction(np.array(temperature, float), 3.0).tolist() == ways

@@ -38,7 +38,7 @@ INTERNAL = {
     },
     "tca_mj.tca.identify": {
         "bench": "measured", "constants": "decoded encoded known_of", "data": "SHOWN", "fit": "*",
-        "latent": "*",
+        "latent": "*", "loops": "direction loops words_on",
         "predict": "*", "reporting": "picture_name result",
     },
     "tca_mj.tca.design": {

@@ -1,6 +1,8 @@
 """Temperature, length and tension from voltage and current: the filter against its own theory."""
 
+import runpy
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -227,3 +229,18 @@ def test_what_it_cannot_be_told():
         observer.step(estimate, [1.0], [0.1], 0.1, duty=1.5)
     with pytest.raises(ValueError, match="truth must have shape"):
         observer.bound(np.ones((3, 4, 1)), np.ones((3, 1)), 0.1)
+
+
+def test_the_page_says_how_fast_a_load_may_be():
+    """After a change: python scripts/load_bandwidth.py --page."""
+    root = Path(__file__).parent.parent
+    script = runpy.run_path(str(root / "scripts" / "load_bandwidth.py"))
+    page = (root / "docs" / "bench.md").read_text("utf-8")
+    _, _, rest = page.partition(script["MARK"])
+    rows = [line.strip("| ").split(" | ") for line in rest.partition(script["END"])[0].split("\n")]
+    found = {row[0]: dict(zip(script["CASES"], row[1:], strict=True)) for row in rows if row[1:]}
+    slow, nominal = "0.1", "heat loss nominal"
+    assert script["cell"](float(slow), nominal) == found[slow][nominal]
+    off = {each: float(row[nominal].partition("(")[2].rstrip(")")) for each, row in found.items()
+           if each in ("0.03", "0.1", "0.3", "1")}  # fmt: skip
+    assert len(off) == 4 and max(off.values()) < 1.2

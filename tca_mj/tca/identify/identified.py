@@ -22,6 +22,7 @@ from tca_mj.tca.identify.constants import (
 )
 from tca_mj.tca.identify.data import UNITS, Data
 from tca_mj.tca.identify.fit import CLEAR, SHARE, Fit, Known, Problem, concerns, fitted, natural
+from tca_mj.tca.identify.loops import Loop, loops, words_on
 from tca_mj.tca.identify.predict import (
     LENGTHS,
     Law,
@@ -117,6 +118,7 @@ class Identification:
         words: What it comes to, in sentences.
         fit: The fit itself.
         noise: Errors of measurement as they were stated.
+        loops: Loops between heating and cooling that the sets show.
     """
 
     tca: TcaSpec
@@ -127,6 +129,7 @@ class Identification:
     words: tuple[str, ...]
     fit: Fit
     noise: Mapping[str, float]
+    loops: tuple[Loop, ...]
 
     @property
     def data(self) -> tuple[Data, ...]:
@@ -263,8 +266,9 @@ def identify(
         high = max(max(seen), fibre.reference_temperature + 1.0)
         measured = replace(spec.fibre, temperature_range=(low, high))
         spec = replace(spec, fibre=measured)
-    words = tuple(_words(fit, found, compared, best, _asked(tca, free)))
-    return Identification(spec, law, best[1], found, compared, words, fit, stated)
+    seen_loops = loops(fit)
+    words = tuple(_words(fit, found, compared, best, _asked(tca, free), seen_loops))
+    return Identification(spec, law, best[1], found, compared, words, fit, stated, seen_loops)
 
 
 def _ends_of(data: Data, ends: Ends | None) -> Spin:
@@ -326,7 +330,7 @@ def _found(fit: Fit) -> list[Found]:
 
 def _words(
     fit: Fit, found: Sequence[Found], compared: Sequence[Compared],
-    best: tuple[Law, Ends | None], asked: Sequence[str],
+    best: tuple[Law, Ends | None], asked: Sequence[str], seen: Sequence[Loop],
 ) -> list[str]:  # fmt: skip
     """What it comes to."""
     good = [each.name for each in found if each.state == "identified"]
@@ -351,7 +355,7 @@ def _words(
             said.append(f"{data.name}: residuals follow one another: there is something in it that"
                         f" the model does not have; errors count {factor / scale:.2g}"
                         " times.")  # fmt: skip
-    return [*said, *_verdict(compared, best)]
+    return [*said, *words_on(seen), *_verdict(compared, best)]
 
 
 def _combinations(fit: Fit, names: Sequence[str]) -> list[str]:

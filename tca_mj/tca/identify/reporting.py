@@ -136,6 +136,7 @@ def result(found: Identification, held_out: Sequence[Data] = ()) -> dict[str, An
         "sets": [judged(data, ("over_stated_errors", scale), ("errors_count", factor))
                  for data, scale, factor in zip(found.data, fit.scales.tolist(),
                                                 fit.factors.tolist(), strict=True)],
+        "loops": [each._asdict() for each in found.loops],
         "held_out": [judged(data) for data in held_out],
         "versions": versions("scipy"),
     }  # fmt: skip
