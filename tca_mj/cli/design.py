@@ -97,8 +97,8 @@ def _design(arguments: argparse.Namespace) -> int:
         from tca_mj.validation.figures import need_matplotlib
 
         need_matplotlib()
-    wish = Wish(**_given(arguments, (name for name, *_ in _WISHES)),
-                **({"creep": None} if arguments.uncrept else {}))  # fmt: skip
+    wanted = _given(arguments, (name for name, *_ in _WISHES))
+    wish = Wish(**wanted | ({"creep": None} if arguments.uncrept else {}))
     spans = (*(name for name, *_ in _SPANS), "strands", "annealing_temperature")
     threads = {Path(each).stem: find_tca(each) for each in arguments.thread}
     found = find_designs(

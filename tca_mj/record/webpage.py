@@ -66,7 +66,7 @@ class WebPage(Closing):
         if self.path.suffix != ".html":
             raise ValueError(f"path must end in .html, got {path}")
         self._simulation, self._interval = simulation, interval
-        self._about = {"title": title, "speed": speed, "follow": follow}
+        self._about: dict[str, Any] = {"title": title, "speed": speed, "follow": follow}
         model, moving = simulation.model, moving_bodies(simulation.model)
         self._bodies = [b for b in body_paths(model) if b == 0 or moving[b]]
         fixed = [b for b in body_paths(model) if b != 0 and not moving[b]]
@@ -241,7 +241,8 @@ def _triangles(
 
 
 def _box(half: Array) -> tuple[Array, Array, NDArray[np.int64]]:
-    corners, normals, faces = [], [], []
+    corners: list[Array] = []
+    normals, faces = [], []
     for axis in range(3):
         for side in (1.0, -1.0):
             normal = np.zeros(3)

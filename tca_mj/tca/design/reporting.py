@@ -98,7 +98,7 @@ def lifted(wish: Wish, design: Design, dt: Positive | None = None) -> Lifted:
     for _ in range(math.ceil(1.2 * float(figures.return_time) / dt)):
         states.append(tcas.step(states[-1], Heating(value=0.0), dt, "quasistatic"))
     return Lifted(
-        time=dt * np.arange(len(states)),
+        time=dt * np.arange(len(states), dtype=np.float64),
         contraction=cold - np.array([float(state.length[0]) for state in states]),
         temperature=np.array([float(state.temperature[0]) for state in states]),
     )

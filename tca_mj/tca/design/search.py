@@ -214,11 +214,11 @@ def _tried(
 
 def _undominated(goals: Array) -> Any:
     """Which rows, (n, aims), no other row is at least as good as in all aims and better in one."""
-    at_least = (goals[:, None] >= goals).all(axis=-1)
-    better = (goals[:, None] > goals).any(axis=-1)
+    at_least = np.all(goals[:, None] >= goals, axis=-1)
+    better = np.any(goals[:, None] > goals, axis=-1)
     _, first = np.unique(goals, axis=0, return_index=True)
     single = np.isin(np.arange(len(goals)), first)
-    return ~(at_least & better).any(axis=1) & single
+    return ~np.any(at_least & better, axis=1) & single
 
 
 def _scaled(goals: Array) -> Array:
