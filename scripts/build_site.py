@@ -193,6 +193,9 @@ def main() -> int:
     code = build(pages, out)
     for page in sorted((ROOT / "docs").glob("tutorial-*.md")):
         write_notebook(page.stem.removeprefix("tutorial-"), out / "notebooks")
+    (out / "pictures").mkdir(parents=True, exist_ok=True)
+    for film in (ROOT / "docs" / "pictures").glob("film_*.webp"):  # Sphinx sees no raw HTML
+        shutil.copyfile(film, out / "pictures" / film.name)
     if code == 0:
         print(f"open {out / 'index.html'}")
     return code

@@ -94,7 +94,7 @@ def task_page(id: str, guides: Mapping[str, str], log: Sequence[str]) -> str:
     curves = [f"![Learning curve of {name}](pictures/curve_{name}.png)" for name in policies
               if (DOCS / "pictures" / f"curve_{name}.png").is_file()]  # fmt: skip
     text = pages.page(
-        f"# `{id}`", first_line(kind), *pictures[:1],
+        f"# `{id}`", first_line(kind), *pictures[:1], _film(id),
         f"Guide: {links(guides, own)}.",
         pages.table(["what", "value"], ([name, fact] for name, fact in facts.items() if fact)),
         "## What it is", prose(kind).partition("\n\n")[2], "## Observation", observation,
@@ -104,6 +104,18 @@ def task_page(id: str, guides: Mapping[str, str], log: Sequence[str]) -> str:
     )  # fmt: skip
     env.close()
     return text
+
+
+def _film(id: str) -> str:
+    """An episode, moving when it is asked for; `scripts/task_films.py` draws them."""
+    path = f"pictures/film_{slug(id).partition('-')[0]}.webp"
+    if not (DOCS / path).is_file():
+        return ""
+    return (
+        "<details><summary>An episode, moving</summary>\n"
+        f'<img loading="lazy" src="{path}" alt="An episode of {id} by a policy of this package">\n'
+        "</details>"
+    )
 
 
 def _results(id: str) -> list[str]:

@@ -132,6 +132,17 @@ def test_tutorials_of_the_site_are_notebooks_too(site):
         assert f"notebooks/{name}" in html[page].links
 
 
+def test_pictures_of_the_site_are_there_and_tasks_move(site):
+    html, out = site
+    for name, page in html.items():
+        pictures = [path for path in page.fetched if not re.match(r"data:", path)]
+        lost = [p for p in pictures if not ((out / name).parent / p.partition("?")[0]).is_file()]
+        assert lost == [], name
+    films = {path.stem.removeprefix("film_") for path in (out / "pictures").glob("film_*.webp")}
+    assert films <= {task.id.partition("/")[2].partition("-")[0] for task in TASKS} and films
+    assert all(f"pictures/film_{name}.webp" in html[f"{name}-v0.html"].text for name in films)
+
+
 def test_a_link_to_nowhere_ends_the_building(tmp_path):
     pytest.importorskip("furo")
     (tmp_path / "index.md").write_text("# Start\n\n[there](#start), [nowhere](#end)\n")

@@ -1,0 +1,78 @@
+"""Draws docs/pictures/film_<Task>.webp: an episode of each task, by its best policy that is here.
+
+    MUJOCO_GL=egl python scripts/task_films.py               all but those that take long
+    MUJOCO_GL=egl python scripts/task_films.py TCA/Jump-v0   one of them
+
+The pages of tasks in the reference show them. The scripted policy acts, or the shipped one that is
+named below.
+"""
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from PIL import Image
+
+from tca_mj.agents.policies import actor, arguments_of
+from tca_mj.agents.rollout import rollout
+from tca_mj.registry import TASKS, make, task_class
+
+SIZE = (384, 288)  # of a picture [pixels]
+COUNT, SHOWN = 36, 0.18  # pictures, and for how long each [s]
+LONGEST = 40.0  # of an episode that does not end before [s]
+# Whom to watch; others are scripted. The course takes minutes.
+ACTORS = {
+    "TCA/BendReach-v0": "bend-reach", "TCA/TetrapodCrawl-v0": "tetrapod-crawl-sac",
+    "TCA/TetrapodWalk-v0": "tetrapod-walk-sac", "TCA/TetrapodShimmy-v0": "tetrapod-shimmy-sac",
+    "TCA/TetrapodShapes-v0": "tetrapod-shapes",
+}  # fmt: skip
+LEFT_OUT = ("TCA/TetrapodCourse-v0",)
+
+
+def film(id: str) -> tuple[list[Image.Image], float]:
+    """Pictures of an episode, evenly over it, and how much faster than life they are.
+
+    Args:
+        id: The task.
+    """
+    name = ACTORS.get(id, "scripted")
+    arguments: dict[str, Any] = arguments_of(name, id)
+    env = make(id, render_mode="rgb_array", size=SIZE,
+               disable_env_checker=True, **arguments)  # fmt: skip
+    task: Any = env.unwrapped
+    most = round(LONGEST / task.control_period)
+    policy = actor(name, env, seed=0)
+    steps = 0  # once without pictures: how long it is
+    for _ in rollout(env, policy, seed=0):
+        steps += 1
+        if steps > most and task_class(id).legs:
+            break
+    wanted = set(np.linspace(0, steps - 1, COUNT).round().astype(int))
+    pictures = []
+    for i, _ in enumerate(rollout(env, policy, seed=0)):
+        if i in wanted:
+            pictures.append(Image.fromarray(np.asarray(env.render())))
+        if i >= steps - 1:
+            break
+    env.close()
+    return pictures, (steps - 1) * task.control_period / (len(pictures) * SHOWN)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
+    parser.add_argument("tasks", nargs="*", help="ids; without any, all that take no hours")
+    parser.add_argument("--out", type=Path, default=Path("docs/pictures"))
+    asked = parser.parse_args()
+    for id in asked.tasks or [task.id for task in TASKS if task.id not in LEFT_OUT]:
+        pictures, fast = film(id)
+        path = asked.out / f"film_{id.partition('/')[2].partition('-')[0]}.webp"
+        pictures[0].save(
+            path, save_all=True, append_images=pictures[1:], duration=round(1e3 * SHOWN), loop=0,
+            quality=55, method=6,
+        )  # fmt: skip
+        print(f"{path}: {path.stat().st_size >> 10} KiB, {fast:.2g} times real time", flush=True)
+
+
+if __name__ == "__main__":
+    main()
