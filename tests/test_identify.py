@@ -324,6 +324,19 @@ def test_a_kink_by_chance_is_no_contact(monkeypatch):
     assert states[1].state == "identified" and states[1].interval[0] > 1.5 * tca.minimum_length
 
 
+def test_what_is_fitted_without_contact_has_none():
+    """Held by contact a coil is longer than it would be: without it, it gets shorter than it was
+    ever seen, and must not touch there either, or the fit stops beside the least."""
+    study = runpy.run_path(str(Path(__file__).parent.parent / "scripts" / "identify_study.py"))
+    tca, start = study["drawn"](5078)
+    fit = identify(simulated_bench(tca, 100, 5078), start, compare=False).fit
+    size, j = fit.problem.size, fit.problem.names.index("minimum_length")
+    assert not fit.slopes[:size, j].any()
+    held = fit.slopes.T @ fit.problem.residuals(fit.x, fit.factors)
+    held[j] = 0.0
+    assert held @ fit.covariance @ held < 0.1  # of the sum of squares is still to be gained
+
+
 def test_the_data_tell_ends_and_models_apart(found):
     first, *others = found.compared
     assert (first.law, first.ends) == ("rod", "usual") == (found.law, found.ends)

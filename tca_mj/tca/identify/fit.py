@@ -60,7 +60,7 @@ _IMPOSSIBLE = 1e6  # residual where the laws have no answer
 _PROFILED, _NEAR = 30, 0.02  # steps of a profile at most; how near to its end it is to come [1]
 _FAR = 25.0  # rise of a profile, over that of its end, from which on a step was too long
 _CONTACT = ("minimum_length", "linear_shortest")
-_APART = 0.9  # of the shortest length: there no coils touch
+_APART, _LOWER = 0.9, 10  # of the shortest length: there no coils touch; times that it is lowered
 _FEW = 20  # rows of a set, below which nothing is said of their order
 # Factors on moduli and growths at which a fit may start.
 _STARTS = ((1.0, 1.0), (2.0, 1.0), (0.5, 1.0), (4.0, 1.0), (8.0, 1.0), (1.0, 2.0), (1.0, 0.5),
@@ -323,11 +323,15 @@ def _without_contact(problem: Problem, x: Array, scales: Array, j: int) -> Array
         point[rest] = inner
         return point
 
-    apart[rest] = least_squares(
-        lambda inner: problem.residuals(whole(inner), scales), x[rest],
-        jac=lambda inner: problem.slopes(whole(inner), scales)[:, rest],
-        x_scale=problem.widths[rest], method="lm", xtol=1e-6, ftol=1e-6, max_nfev=50,
-    ).x  # fmt: skip
+    for _ in range(_LOWER):
+        apart[rest] = least_squares(
+            lambda inner: problem.residuals(whole(inner), scales), apart[rest],
+            jac=lambda inner: problem.slopes(whole(inner), scales)[:, rest],
+            x_scale=problem.widths[rest], method="lm", xtol=1e-6, ftol=1e-6, max_nfev=50,
+        ).x  # fmt: skip
+        if not problem.slopes(apart, scales)[: problem.size, j].any():
+            break
+        apart[j] += math.log(_APART)  # what is not held by contact may become shorter than was seen
     return apart
 
 
