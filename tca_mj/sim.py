@@ -158,9 +158,12 @@ class Simulation:
         self.tca_period = tca_period
         self.chains = part.members
         self.tca_names = tuple(tca.name for tca in part.tcas)
-        self.bank = bank_of(
-            [tca.spec for tca in part.tcas], law, ambient, creep, cycles
-        )
+        if not part.tcas:
+            raise ValueError(
+                f"part must have at least one muscle, got none in {part.spec.modelname!r}: add_tca"
+                " lays one into a chain"
+            )
+        self.bank = bank_of([tca.spec for tca in part.tcas], law, ambient, creep, cycles)
         self.bank.supply = supply or Supply()
         self.substeps = substeps
         self._lasting = math.nan, 0  # a duration, and how many updates it takes

@@ -12,7 +12,7 @@ from tca_mj.model import settle
 from tca_mj.model.chain import add_chain
 from tca_mj.model.part import Part, new_spec
 from tca_mj.model.tendon import route_passes, route_tca
-from tca_mj.modules.bending import BendingSpec, bending_module
+from tca_mj.modules.bending import BendingSpec, bending_module, silicone_cylinder
 from tca_mj.modules.finger import finger_pair
 from tca_mj.routes import Helix, leg_length
 from tca_mj.sim import Simulation
@@ -361,6 +361,13 @@ def test_a_bad_step_is_refused_and_changes_nothing(power, duration, message):
 def test_a_bad_simulation_is_refused(options, message):
     with pytest.raises(ValueError, match=message):
         simulation(**options)
+
+
+def test_a_part_without_a_muscle_is_refused():
+    part = Part(new_spec("bare"))
+    add_chain(part, silicone_cylinder(0.04, 8e-3, 8e-3), nodes=4, name="bare")
+    with pytest.raises(ValueError, match="part must have at least one muscle, got none in 'bare'"):
+        Simulation(part)
 
 
 def test_dm_controls_names_see_the_same_state():
