@@ -186,7 +186,7 @@ BY_SURFACE: dict[str, dict[str, Any]] = {
         {"path": lambda: _model_file()},
     ),
     "record.reader.read": {"path": lambda: recorded()},
-    "sim.Haste": {"timestep": 1e-4, "tca_period": 1e-3},
+    "drive.Haste": {"timestep": 1e-4, "tca_period": 1e-3},
     "sim.Simulation.bend": {"chains": "body"},
     "sim.Simulation.keep": {"temperature": [60.0] * 3},
     "sim.Simulation.rest": {"temperature": [30.0] * 3},
@@ -213,6 +213,19 @@ BY_SURFACE: dict[str, dict[str, Any]] = {
     "tca.sensing.wire.fit_displacement": {
         "resistance": [3.0, 3.1, 3.2, 3.3, 3.4], "displacement": [0.0, 1e-3, 2e-3, 3e-3, 4e-3],
     },
+    "tca.design.wish.Wish": {"stroke": 8e-3, "load": 0.2, "time": 5.0, "voltage": 4.0},
+    "tca.design.candidates.Winding": {
+        "thread": "free-stroke", "core_diameter": 4e-4, "groove_pitch_angle": 0.35,
+        "fibre_length": 0.2, "strands": 1,
+    },
+    "tca.design.candidates.designed": {"annealing_temperature": 180.0},
+    "tca.design.search.find_designs": {
+        "aims": ["energy", "mass"], "population": 8, "generations": 2,
+    },
+    "tca.design.reporting.lifted": {"dt": 0.05},
+    "tca.design.search.Designs.values": {"name": "energy"},
+    "tca.design.reporting.write_designs": {"out": "designs"},
+    "record.webpage.WebPage": {"path": "page.html"},
     "tca.identify.logged.follow_log": {"data": lambda: _logged()},
     "tca.sensing.observer.TcaObserver.begin": {"temperature": 25.0},
     "tca.sensing.observer.TcaObserver.step": {"voltage": [1.0], "current": [0.3]},
@@ -469,11 +482,13 @@ def _samples() -> dict[Any, Callable[[], Any]]:
     from tca_mj.record.film import Film
     from tca_mj.record.recorder import Recorded, Recorder
     from tca_mj.record.render import Closing, Watched
+    from tca_mj.record.webpage import WebPage
     from tca_mj.rod import BeamSpec, Outline, Segment
     from tca_mj.routes import Helix, Route, UTurn
     from tca_mj.sim import Simulation
     from tca_mj.smp.lumped import LumpedModule
     from tca_mj.state import SimulationState, get_state
+    from tca_mj.tca.design import Design, Designs, Space, Winding, Wish, find_designs
     from tca_mj.tca.identify import (
         Data,
         Followed,
@@ -514,6 +529,9 @@ def _samples() -> dict[Any, Callable[[], Any]]:
 
     measured = cache(lambda: read_data(bench_file(), fibre))
     identified = cache(lambda: identify([measured()], fibre, free=["shear"], compare=False))
+    wish = Wish(stroke=8e-3, load=0.2, time=5.0, voltage=4.0)
+    found = cache(lambda: find_designs(wish, population=20, generations=6))
+
     @cache
     def steps() -> Transitions:
         return collect(TASK, episodes=2, steps=4, arguments={"action": "power"}, threads=1)
@@ -526,6 +544,9 @@ def _samples() -> dict[Any, Callable[[], Any]]:
         Transitions: steps, View: view, TaskModel: lambda: fit_model(steps(), view()),
         Foresight: lambda: ByModel(fit_model(steps(), view())), Horizon: Horizon,
         Data: measured, Identification: identified,
+        Wish: lambda: wish, Space: Space, Designs: found, Design: lambda: found().best,
+        Winding: lambda: found().best.winding,
+        WebPage: lambda: WebPage(bent(), "sample.html"),
         tca.TcaSpec: lambda: fibre, tca.FibreSpec: lambda: fibre.fibre,
         tca.FibreSpec | tca.FibreTable: lambda: fibre.fibre,
         tca.Material: lambda: tca.MATERIALS["nylon monofilament"],

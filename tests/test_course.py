@@ -260,9 +260,9 @@ def test_curled_legs_open_the_body(friction):
     walker = CourseWalker(env)
     walker._number = [stage.name for stage in walker._plan].index("open")
     observation = env.seen()
-    while walker._part != "harden":
+    while walker._part != "harden":  # after 18 to 32 s: contacts are not the same on all machines
         observation, *_ = env.step(walker.act(observation))
-        assert env.sim.time < 30.0
+        assert env.sim.time < 45.0
     assert 20.0 < 206.0 - np.degrees(env.body_angle) < 50.0
     assert abs(env.position[1]) < 0.025 and not env.sim.spines.damaged.any()
 

@@ -378,7 +378,7 @@ def test_a_search_for_a_gait_has_the_muscle(mine, tmp_path, monkeypatch):
     real = searching.run_trial
 
     def noted(trial):
-        asked.append(trial.tca)
+        asked.append(trial.robot["tca"])
         return real(trial)
 
     monkeypatch.setattr(searching, "run_trial", noted)

@@ -101,6 +101,7 @@ def test_a_notebook_runs(tmp_path, monkeypatch):
 
     for place in ("IPYTHONDIR", "JUPYTER_DATA_DIR", "JUPYTER_RUNTIME_DIR", "JUPYTER_CONFIG_DIR"):
         monkeypatch.setenv(place, str(tmp_path / "jupyter"))
+    monkeypatch.delenv("MPLBACKEND", raising=False)  # pictures are shown below their cells
     monkeypatch.setenv("PATH", str(sys.executable).rpartition("/")[0], prepend=":")
     made = notebook("physics")
     expected = {cell.id: cell.outputs[0].text for cell in made.cells if cell.get("outputs")}

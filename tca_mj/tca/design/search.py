@@ -10,7 +10,7 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from tca_mj.checks import Array, Seed, door, shown, whole
+from tca_mj.checks import Array, Seed, door, require_one_of, shown, whole
 from tca_mj.hints import nearest
 from tca_mj.tca.design.candidates import (
     BOUNDS,
@@ -73,8 +73,17 @@ class Designs:
         """The chosen one."""
         return self.front[self.chosen]
 
+    @door
     def values(self, name: str) -> Array:
-        """One figure of all designs of the front, shape (n,)."""
+        """One figure of all designs of the front, shape (n,).
+
+        Args:
+            name: One of ``Figures``.
+
+        Raises:
+            ValueError: If there is no such figure.
+        """
+        require_one_of("name", name, Figures._fields)
         return np.array([float(getattr(each.figures, name)) for each in self.front])
 
     @door
