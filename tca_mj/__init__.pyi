@@ -40,6 +40,7 @@ from tca_mj.tca.bank import TcaBank
 from tca_mj.tca.catalogue import CATALOGUE
 from tca_mj.tca.spec import FibreSpec, TcaSpec
 from tca_mj.tca.supply import Supply, Thermostat
+from tca_mj.traces import Trace, TraceFit, fit_traces
 from tca_mj.variation import Nominal, Variation
 
 __version__: str
@@ -51,11 +52,11 @@ __all__ = [
     "MuscleBank", "Nominal", "Outline", "Part", "Recorder", "Route", "RoutedTca", "Simulation",
     "SimulationBatch", "SimulationDiverged", "SimulationOverheated", "SimulationState",
     "SoftFingerSpec", "Supply", "TASKS", "Task", "TcaBank", "TcaSpec", "TetrapodSpec", "Thermostat",
-    "TwistMorphingSpec", "TwistingSpec", "UTurn", "Variation", "adaptive_gripper", "add_chain",
-    "add_tca", "arm", "bending_module", "bistable_gripper", "bistable_module", "continuum_leg",
-    "episode_steps", "export", "find_task", "finger_pair", "frozen", "get_state", "gripper",
-    "in_arena", "innervated_finger", "jumper", "leg_length", "make", "morphing_3d_module",
-    "morphing_grid", "morphing_module", "new_spec", "parallel", "register", "register_task",
-    "rigid_tetrapod", "scene", "set_state", "soft_finger", "stage", "task_class", "tetrapod",
-    "twist_morphing_module", "twisting_module",
+    "Trace", "TraceFit", "TwistMorphingSpec", "TwistingSpec", "UTurn", "Variation",
+    "adaptive_gripper", "add_chain", "add_tca", "arm", "bending_module", "bistable_gripper",
+    "bistable_module", "continuum_leg", "episode_steps", "export", "find_task", "finger_pair",
+    "fit_traces", "frozen", "get_state", "gripper", "in_arena", "innervated_finger", "jumper",
+    "leg_length", "make", "morphing_3d_module", "morphing_grid", "morphing_module", "new_spec",
+    "parallel", "register", "register_task", "rigid_tetrapod", "scene", "set_state", "soft_finger",
+    "stage", "task_class", "tetrapod", "twist_morphing_module", "twisting_module",
 ]  # fmt: skip

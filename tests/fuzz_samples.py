@@ -226,6 +226,12 @@ BY_SURFACE: dict[str, dict[str, Any]] = {
     "tca.design.search.Designs.values": {"name": "energy"},
     "tca.design.reporting.write_designs": {"out": "designs"},
     "record.webpage.WebPage": {"path": "page.html"},
+    "traces.Trace": {
+        "time": [0.0, 1.0], "command": [[1.0, 0.0, 0.0]], "seen": {"bend": [0.0, 0.3]},
+        "error": {"bend": 0.02},
+    },
+    "traces.TraceFit.identified": {"name": "length"},
+    "traces.TraceFit.interval": {"name": "length"},
     "tca.identify.logged.follow_log": {"data": lambda: _logged()},
     "tca.sensing.observer.TcaObserver.begin": {"temperature": 25.0},
     "tca.sensing.observer.TcaObserver.step": {"voltage": [1.0], "current": [0.3]},
@@ -497,6 +503,7 @@ def _samples() -> dict[Any, Callable[[], Any]]:
         identify,
         read_data,
     )
+    from tca_mj.traces import TraceFit
 
     fibre = tca.CATALOGUE["free-stroke"]
     bank = cache(lambda: tca.TcaBank([fibre]))
@@ -544,6 +551,10 @@ def _samples() -> dict[Any, Callable[[], Any]]:
         Transitions: steps, View: view, TaskModel: lambda: fit_model(steps(), view()),
         Foresight: lambda: ByModel(fit_model(steps(), view())), Horizon: Horizon,
         Data: measured, Identification: identified,
+        TraceFit: lambda: TraceFit(
+            values={"length": 0.05}, relative_error={"length": 0.1}, spread=1.0, expected=(),
+            correlation=np.eye(1), freedom=10,
+        ),
         Wish: lambda: wish, Space: Space, Designs: found, Design: lambda: found().best,
         Winding: lambda: found().best.winding,
         WebPage: lambda: WebPage(bent(), "sample.html"),

@@ -59,7 +59,7 @@ _ACTS = "acts on what a task has shown"
 NO_DOOR = {
     **dict.fromkeys(
         ("bench", "validation", "certify", "cli", "agents.train.deep", "agents.train.search.search",
-         "agents.sweep.Trial", "agents.sweep.run_sweep"), _PROGRAM),
+         "agents.sweep.Trial", "agents.sweep.run_sweep", "traces.fit_traces"), _PROGRAM),
     **dict.fromkeys(
         (
             "tca.laws.rod.CoilRods.unsoftened", "tca.laws.rod.CoilRods.finished",

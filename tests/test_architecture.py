@@ -41,6 +41,7 @@ LAYER_OF = {
     "state": "sim",
     "couple": "sim",
     "drive": "sim",
+    "traces": "sim",
     "actuation": "control",
     "exported": "sim",
     "testing": "agents",
