@@ -92,6 +92,8 @@ def navigation(index: str) -> str:
         lists.append(toctree(names, title))
     generated = ["replays", "all-tasks", "all-robots", "commands", "all-names"]
     lists.append(toctree(generated, "Reference"))
+    watched = "**[Watch them](replays.md)** in this browser, from all sides.\n\n## "
+    index = index.replace("## ", watched, 1)
     return "\n\n".join([index, *lists, toctree([*OUTSIDE.values()], "Project"), ""])
 
 
