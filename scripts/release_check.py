@@ -29,7 +29,7 @@ ROOT = Path(__file__).resolve().parent.parent
 OUT = ROOT / "runs" / "release"
 PAGE = ROOT / "docs" / "release.md"
 MARK = "<!-- Written by scripts/release_check.py from here on. -->"
-EXTRAS = ("rl", "demo", "onnx")
+EXTRAS = ("rl", "demo", "onnx", "design")
 # What is tried in the clean environments, from the unpacked sdist: physics, bodies, a step of
 # every task, recordings, policies, and the command.
 TESTS = ("test_bank", "test_statics", "test_static", "test_chain", "test_sim", "test_wrappers",
