@@ -138,7 +138,7 @@ class Transitions(Checked):
 def packed(path: str | Path, header: Mapping[str, Any], found: Mapping[str, Any]) -> Path:
     """Writes arrays by name, with a header that becomes JSON, into an ``.npz`` in one go."""
     memory, said = io.BytesIO(), np.array(json.dumps(header))
-    np.savez_compressed(memory, allow_pickle=False, header=said, **found)
+    np.savez_compressed(memory, header=said, **found)
     return write_whole(Path(path), memory.getvalue())
 
 

@@ -164,7 +164,7 @@ class SavedPolicy(Checked):
         more = {"units": network.units, "bounds": network.bounds}
         rows |= {name: array for name, array in more.items() if array is not None}
         memory = io.BytesIO()
-        np.savez(memory, allow_pickle=False, header=np.array(json.dumps(header)), **rows)
+        np.savez(memory, header=np.array(json.dumps(header)), **rows)
         return write_whole(path, memory.getvalue())
 
     @door
