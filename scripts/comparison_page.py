@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from comparison_peers import frequency, off
+from comparison_peers import frequency, off, step_time
 
 import tca_mj
 from tca_mj import pages
@@ -128,13 +128,7 @@ def own_steps() -> float:
     """Processor time of a step of the smallest task, with random actions [s]."""
     env = tca_mj.make("TCA/BendReach-v0")
     env.reset(seed=0)
-    for count in (100, 3000):
-        clock = time.process_time()
-        for _ in range(count):
-            _, _, terminated, truncated, _ = env.step(env.action_space.sample())
-            if terminated or truncated:
-                env.reset()
-    return (time.process_time() - clock) / count
+    return step_time(env)
 
 
 def ms(seconds: float) -> str:

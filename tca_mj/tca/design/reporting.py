@@ -188,9 +188,10 @@ def _cautions(found: Designs) -> Iterator[str]:
     yield ("Resistance and heat loss per length of fibre, and how close coils touch, are taken from"
            " the TCA by which the thread is known; the loss is that of still air, and of strands"
            " that hang apart.")
-    yield ("Both ends are glued. The creep under the load is one of a single thread."
-           if wish.creep is not None else "Both ends are glued. Creep is left out.")
-    if float(figures.torsion) > _MEASURED_TORSION:
+    yield ("Both ends are glued. The constants of creep are those of one thread, silver-coated"
+           " nylon." if wish.creep is not None else "Both ends are glued. Creep is left out.")
+    softened = best.tca.fibre.load_softening[:2] != (0.0, 0.0)
+    if softened and float(figures.torsion) > _MEASURED_TORSION:
         yield (f"The load twists the fibre by {float(figures.torsion):.0f} rad/m; how that softens"
                f" it was measured up to {_MEASURED_TORSION:g}.")
     if best.tca.breaking_force is None:
