@@ -2,8 +2,12 @@
 
     python scripts/bench_page.py             draws docs/pictures/bench_*.png
     python scripts/bench_page.py --tables    prints the tables; takes some minutes
+    python scripts/bench_page.py --page      writes them into the page
+
+The table of loads that vary in bandwidth is that of scripts/load_bandwidth.py.
 """
 
+import sys
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cache
@@ -11,11 +15,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from load_bandwidth import bandwidth_table
 from numpy.typing import NDArray
 
 from tca_mj.control import TcaServo, goal_temperature, pi_rest, pi_step
-from tca_mj.pages import folder_of_pictures, table
+from tca_mj.pages import folder_of_pictures, table, write_between
 from tca_mj.tca import (
     CoilSurfaces,
     CurrentSensor,
@@ -127,7 +130,7 @@ DT, STEPS, RUNS = 0.05, 240, 40
 
 
 def excitations() -> dict[str, Array]:
-    """Powers that keep the sensing TCA 50 K warm on average, shape (STEPS,) each [W]."""
+    """Powers that keep the sensing TCA 50 K warm on average, or 75 K, (STEPS,) each [W]."""
     mean = 50.0 * float(SENSED.heat.loss)
     time = DT * np.arange(STEPS)
 
@@ -139,6 +142,8 @@ def excitations() -> dict[str, Array]:
         "steps of ± 50 %, 4 s": mean * (1.0 + 0.5 * side(4.0)),
         "on and off, 2 s": mean * (1.0 + side(2.0)),
         "on and off, 8 s": mean * (1.0 + side(8.0)),
+        "± 30 %, 4 s, 75 K warm": 1.5 * mean * (1.0 + 0.3 * side(4.0)),
+        "on and off, 2 s, 75 K warm": 1.5 * mean * (1.0 + side(2.0)),
     }
 
 
@@ -147,7 +152,7 @@ def informed(powers: Array, wander: float) -> tuple[float, float, int]:
 
     At the start the TCA has been at rest for long: its temperature is what its loss makes of it.
     """
-    spec = ObserverSpec(loss_error=0.2, tension_rate=wander)
+    spec = ObserverSpec(loss_error=0.2, tension_rate=wander, start_error=0.0)
     observer = TcaObserver(TcaBank([SENSED], law="surface"), spec)
     random, bank = np.random.default_rng(2), observer.bank
     ratio = 1.0 + spec.loss_error * random.standard_normal((RUNS, 1))
@@ -163,27 +168,18 @@ def informed(powers: Array, wander: float) -> tuple[float, float, int]:
         truth.append(np.stack([warm, air, observer.under_load(warm, load), ratio]))
         loads.append(load)
     states = np.array(truth)
-    # What is known at the start: T and r are off together, and so is the length by nothing.
-    known = observer.begin(observer.expected(replace(observer.begin(np.full((RUNS, 1), 7.0)),
-                                                     mean=states[0])))  # fmt: skip
-    tied = known.covariance.copy()
-    tied[0, 0], tied[0, 3] = (spec.loss_error * first) ** 2, spec.loss_error**2 * first
-    tied[3, 0] = tied[0, 3]
-    start = states[0].copy()
-    start[0], start[3] = 25.0 + first, 1.0
-    estimate = replace(known, mean=start, covariance=tied)
-    bound, off, low = replace(estimate, mean=states[0]), [], []
-    for power, state, now in zip(powers, states[1:], loads[1:], strict=True):
-        ohms = observer.expected(replace(bound, mean=state))
-        noisy = ohms + spec.resistance_noise * random.standard_normal(ohms.shape)
+    blank = observer.begin(np.full((RUNS, 1), 7.0))
+    ohms = [observer.expected(replace(blank, mean=state)) for state in states]
+    estimate, off = observer.begin(ohms[0], steady_power=float(powers.mean())), []
+    for power, true, now in zip(powers, ohms[1:], loads[1:], strict=True):
+        noisy = true + spec.resistance_noise * random.standard_normal(true.shape)
         estimate = observer.corrected(observer.predicted(estimate, power, DT), noisy)
         off.append(observer.tension(estimate).tension - now)
-        bound = replace(observer.predicted(bound, power, DT), mean=state)
-        bound = observer.corrected(bound, ohms)
-        low.append(observer.tension(bound).deviation)
+    all_powers = np.broadcast_to(powers[:, None, None], (STEPS, RUNS, 1))
+    low = observer.bound(states, all_powers, DT, steady_power=float(powers.mean()))[2]
     late = slice(STEPS // 2, None)
     rank = observer.rank(25.0 + float(first[0]), WEIGHT, powers[:160], DT)
-    return rms(off[late]) / WEIGHT, rms(low[late]) / WEIGHT, rank
+    return rms(np.array(off)[late]) / WEIGHT, rms(low[late]) / WEIGHT, rank
 
 
 @cache
@@ -517,10 +513,10 @@ def pictures(out: Path) -> None:
                       label=f"bound, {wander:g} N/s$^{{0.5}}$")  # fmt: skip
             left.plot(x, 100.0 * pairs[:, 0], ".", color=shade, ms=8)
         left.set_xticks(x, [name.replace(", ", ",\n").replace(": ", ":\n")
-                            for name in excitations()], fontsize=7)  # fmt: skip
+                            for name in excitations()], fontsize=6)  # fmt: skip
         left.set(ylabel="error of the force [% of 20 g]", yscale="log",
                  title="heat loss known to 20 %")  # fmt: skip
-        left.legend()
+        left.legend(fontsize=7)
         for value, shade in ((7.0, green), (28.0, orange)):
             time, length, tension = held("impedance", 1.0, value)
             late = time > 12.0
@@ -535,14 +531,19 @@ def pictures(out: Path) -> None:
     draw(out / "bench_observed.png", 10.0, 3.6, told)
 
 
+TABLES = {"observer": observer_table, "observability": observability_table,
+          "control": control_table, "force": force_table}  # fmt: skip
+
+
 def main() -> None:
-    out = folder_of_pictures(__doc__, Path("docs/pictures"))
-    if out is None:
-        for lines in (force_table, observability_table, bandwidth_table, control_table,
-                      observer_table):  # fmt: skip
-            print("\n".join(lines()), flush=True, end="\n\n")
-    else:
+    if "--page" in sys.argv[1:]:
+        for name, lines in TABLES.items():
+            write_between(Path("docs/bench.md"), f"scripts/bench_page.py: {name}", lines())
+    elif (out := folder_of_pictures(__doc__, Path("docs/pictures"))) is not None:
         pictures(out)
+    else:
+        for lines in TABLES.values():
+            print("\n".join(lines()), flush=True, end="\n\n")
 
 
 if __name__ == "__main__":

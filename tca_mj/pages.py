@@ -40,6 +40,28 @@ def page(*blocks: str | Iterable[str]) -> str:
     return "\n\n".join(text for text in texts if text)
 
 
+def write_between(path: Path, mark: str, lines: Iterable[str]) -> None:
+    """Writes lines into a page, between ``<!-- mark -->`` and the next ``<!-- end -->``.
+
+    Args:
+        path: The page.
+        mark: What its table is marked with, the command that writes it.
+        lines: What stands there from now on.
+
+    Raises:
+        ValueError: If the page has no such mark, several of them, or none that ends it.
+    """
+    text, first = path.read_text(encoding="utf-8"), f"<!-- {mark} -->"
+    before, *rest = text.split(first)
+    if len(rest) != 1 or "<!-- end -->" not in rest[0]:
+        raise ValueError(
+            f"{path.name} must have one {first} that <!-- end --> follows, got {len(rest)}"
+        )
+    after = rest[0].partition("<!-- end -->")[2]
+    written = "\n".join([f"{before}{first}", "", *lines, "", f"<!-- end -->{after}"])
+    write_whole(path, written.encode())
+
+
 def write_result(
     out: Path | None, name: str, result: Any, text: str, *, indent: int = 2
 ) -> None:

@@ -9,10 +9,14 @@ Kalman filter weighs the three, with the state
     T_b   of the body        C_b dT_b/dt = (G (T - T_b) - λ_b (T_b - T_amb))/r
     l     length             F(l, T) + k l = load, and the load wanders
     r     nominal over true heat loss, constant or wandering; T is nearly linear in it
+    m     mean of the load, where its bandwidth f is given
 
-The load is a random walk, as nothing is known of it; where a spring of stiffness k holds against
-the TCA, k may be given. A length that heat alone changes is predicted so, and what a reading of the
-resistance says besides is the load's. Heat is solved exactly, its derivative by r is a difference.
+The load is a random walk, as nothing is known of it; or, with a bandwidth, it comes back to a mean
+that nobody knows, d load/dt = 2 pi f (m - load) + noise, so that what is fast can be averaged away
+and the heat behind it heard. Where a spring of stiffness k holds against the TCA, k may be given. A
+length that heat alone changes is predicted so, and what a reading of the resistance says besides is
+the load's. Heat is solved exactly, its derivative by r is a difference. The resistance has a kink
+where the coils begin to touch, so that each reading is linearised anew where it leads to.
 
 What cannot be told: the resistance does not know the temperature. While power and length stay as
 they are, all (T, r) with λ (T - T_amb) = r P fit equally well, each with a tension of its own: a
@@ -48,9 +52,10 @@ from tca_mj.tca.bank import TcaBank, TcaState
 from tca_mj.tca.sensing import wire
 from tca_mj.tca.thermal import HeatStep
 
-_T, _BODY, _L, _R = range(4)
+_T, _BODY, _L, _R, _M = range(5)
 _KELVIN, _METRE, _SHARE = 0.2, 1e-5, 1e-3  # of the differences
 _LEAST, _MOST = 0.1, 10.0  # of r: an estimate, twice what ``Variation`` allows
+_RELINEARISED = 4  # times; where the coils begin to touch the resistance has a kink
 _NEWTON = 12  # steps to the first length: the resistance is nearly straight
 
 
@@ -69,6 +74,10 @@ class ObserverSpec(Checked):
         loss_error: Standard deviation of the heat loss at the start, relative. With 0 and a
             ``loss_rate`` of 0 the nominal loss is believed [1].
         loss_rate: How far it wanders, relative [1/s^0.5].
+        load_bandwidth: How fast the load comes back to its mean, which is not known and then is a
+            state of its own: noise of first order, whose standard deviation is ``tension_rate`` /
+            sqrt(4 pi bandwidth). With 0 it wanders, and comes back to nothing [Hz].
+        mean_rate: How far that mean wanders, likewise [N/s^0.5].
         load_stiffness: Of a spring that holds against the TCA, 0 for a weight [N/m].
         start_error: Standard deviation of the temperature at the start [K].
     """
@@ -79,6 +88,8 @@ class ObserverSpec(Checked):
     temperature_rate: NotNegative = 0.3
     loss_error: NotNegative = 0.0
     loss_rate: NotNegative = 0.0
+    load_bandwidth: NotNegative = 0.0
+    mean_rate: NotNegative = 0.0
     load_stiffness: NotNegative = 0.0
     start_error: NotNegative = 1.0
 
@@ -88,9 +99,9 @@ class Estimate:
     """What is believed of n TCAs.
 
     Attributes:
-        mean: Temperature [°C], that of the body [°C], length [m] and nominal over true heat
-            loss [1], shape (4, ..., n).
-        covariance: Of their errors, shape (4, 4, ..., n) [products of those units].
+        mean: Temperature [°C], that of the body [°C], length [m], nominal over true heat loss [1]
+            and, where the load has a bandwidth, its mean [N]: k = 4 or 5 rows, shape (k, ..., n).
+        covariance: Of their errors, shape (k, k, ..., n) [products of those units].
     """
 
     mean: Array
@@ -164,36 +175,41 @@ class TcaObserver:
         self.bank, self.spec = bank, spec or ObserverSpec()
         self._resistance = resistance or partial(wire.resistance, wire.WireTable.of(bank.specs))
         self._adapts = self.spec.loss_error > 0.0 or self.spec.loss_rate > 0.0
+        self._returns = 2.0 * np.pi * self.spec.load_bandwidth  # of the load to its mean [1/s]
+        self._states = 5 if self._returns else 4
 
     @door
-    def begin(self, resistance: Numbers, temperature: ArrayLike | None = None) -> Estimate:
-        """What a first reading tells of TCAs that are as warm as their bodies.
+    def begin(
+        self, resistance: Numbers, temperature: ArrayLike | None = None, *,
+        steady_power: ArrayLike | None = None,
+    ) -> Estimate:  # fmt: skip
+        """What a first reading tells of TCAs that are as warm as their bodies, or at rest.
 
         Args:
             resistance: The reading, shape (..., n) [ohm].
             temperature: Of TCAs and bodies, broadcast with it; None is that of the surroundings
                 [°C].
+            steady_power: Under which they have come to rest, in place of a temperature. By how much
+                they are then warmer than nominal is as uncertain as the heat loss, and tied to it
+                [W].
 
         Raises:
-            ValueError: If the last axis is not n, a number is not finite, or a reading not above 0.
+            ValueError: If the last axis is not n, a number is not finite, a reading not above 0, a
+                power negative, or both temperature and power are given.
         """
         ohms = self._sized("resistance", within("resistance", resistance, above=0.0))
-        warm = self.bank.heat.ambient if temperature is None else temperature
-        warm = np.broadcast_to(within("temperature", warm), ohms.shape)
-        length = np.broadcast_to(self.bank.rest_length, ohms.shape)
-        for _ in range(_NEWTON):
-            now, slope, _ = self._read(length, warm)
-            length = self._inside(length + (ohms - now) / slope)
-        _, slope, _ = self._read(length, warm)
-        spec, zero = self.spec, np.zeros(ohms.shape)
-        covariance = np.zeros((4, 4, *ohms.shape))
-        embedded = np.where(self.bank.embedded, 1.0, 0.0)
-        for place, deviation in (
-            (_T, spec.start_error), (_BODY, spec.start_error * embedded),
-            (_L, spec.resistance_noise / slope), (_R, spec.loss_error),
-        ):  # fmt: skip
-            covariance[place, place] = np.square(deviation + zero)
-        return Estimate(np.stack([warm, warm, length, zero + 1.0]), covariance)
+        if steady_power is None:
+            warm = self.bank.heat.ambient if temperature is None else temperature
+            warm = np.broadcast_to(within("temperature", warm), ohms.shape)
+            return self._begun(ohms, warm, warm, None)
+        if temperature is not None:
+            raise ValueError(
+                "temperature must be None where steady_power tells it, got"
+                f" {temperature} °C and {steady_power} W"
+            )
+        warm = self.bank.heat.ambient + self._rise(steady_power)
+        warm = np.broadcast_to(warm, ohms.shape)
+        return self._begun(ohms, warm, self.bank.heat.steady_body(warm), steady_power)
 
     @door
     def step(
@@ -238,8 +254,10 @@ class TcaObserver:
         mean, jacobian, heated, give = self._moved(estimate.mean, power, dt)
         covariance = np.einsum("ij...,jk...,lk...->il...", jacobian, estimate.covariance, jacobian)
         covariance += spec.temperature_rate**2 * dt * heated[:, None] * heated
-        covariance[_L, _L] += np.square(spec.tension_rate * give) * dt
+        covariance[_L, _L] += np.square(give) * self._stirred(dt)
         covariance[_R, _R] += spec.loss_rate**2 * dt
+        if self._returns:
+            covariance[_M, _M] += spec.mean_rate**2 * dt
         return Estimate(mean, covariance)
 
     @door
@@ -260,17 +278,35 @@ class TcaObserver:
             "deviation", self.spec.resistance_noise if deviation is None else deviation, above=0.0
         )
         ohms = floats("resistance", resistance)
-        expected, by_length, by_heat = self._read(estimate.length, estimate.temperature)
-        slopes = np.zeros_like(estimate.mean)
+        there = np.isfinite(ohms) & (ohms > 0.0)
+        ohms, before = np.where(there, ohms, 1.0), estimate.mean
+        share = np.where(there, 1.0, 0.0)
+        mean, best, least = before, before, np.full(before.shape[1:], np.inf)
+        for _ in range(_RELINEARISED):
+            gain, spread, missing = self._gain(estimate, mean, ohms, noise)
+            mean = before + share * gain * missing
+            mean[_L] = self._inside(mean[_L])
+            off = ohms - self._read(mean[_L], mean[_T])[0]
+            cost = missing**2 * (spread - noise**2) / spread**2 + np.square(off / noise)
+            best = np.where(cost < least, mean, best)
+            least = np.minimum(cost, least)
+        gain, spread, _ = self._gain(estimate, best, ohms, noise)
+        gain = share * gain
+        mean = best.copy()
+        mean[_R] = np.clip(mean[_R], _LEAST, _MOST)
+        return Estimate(mean, estimate.covariance - gain[:, None] * gain * spread)
+
+    def _gain(
+        self, estimate: Estimate, mean: Array, ohms: Array, noise: Array
+    ) -> tuple[Array, Array, Array]:
+        """The gain of a reading linearised about ``mean``, the variance of what it misses, that."""
+        expected, by_length, by_heat = self._read(mean[_L], mean[_T])
+        slopes = np.zeros_like(mean)
         slopes[_L], slopes[_T] = by_length, by_heat
         shared = np.einsum("ij...,j...->i...", estimate.covariance, slopes)
         spread = np.einsum("i...,i...->...", slopes, shared) + np.square(noise)
-        there = np.isfinite(ohms) & (ohms > 0.0)
-        gain = np.where(there, 1.0, 0.0) * shared / spread
-        mean = estimate.mean + gain * np.where(there, ohms - expected, 0.0)
-        mean[_L] = self._inside(mean[_L])
-        mean[_R] = np.clip(mean[_R], _LEAST, _MOST)
-        return Estimate(mean, estimate.covariance - gain[:, None] * gain * spread)
+        missing = ohms - expected - np.einsum("i...,i...->...", slopes, estimate.mean - mean)
+        return shared / spread, spread, missing
 
     @door
     def expected(self, estimate: Estimate) -> Array:
@@ -287,7 +323,10 @@ class TcaObserver:
         return Sensed(force, np.sqrt(np.maximum(spread, 0.0)))
 
     @door
-    def bound(self, truth: Numbers, power: Numbers, dt: Positive) -> Array:
+    def bound(
+        self, truth: Numbers, power: Numbers, dt: Positive, *,
+        steady_power: ArrayLike | None = None,
+    ) -> Array:  # fmt: skip
         """Standard deviations that no observer can beat along a course: the Cramer-Rao bound.
 
         It is the inverse of Fisher's information, with that of the start and of the random walks
@@ -295,9 +334,11 @@ class TcaObserver:
         told the truth after each step.
 
         Args:
-            truth: States as those of ``Estimate.mean``, shape (k + 1, 4, ..., n).
+            truth: States as those of ``Estimate.mean``, shape (k + 1, 4 or 5, ..., n).
             power: Mean power between two of them, shape (k, ..., n) [W].
             dt: Time between two of them [s].
+            steady_power: Under which they had come to rest before, as for ``begin``; None where
+                the first temperature is known [W].
 
         Returns:
             Of temperature, length, and tension, shape (3, k, ..., n) [K, m, N].
@@ -306,13 +347,14 @@ class TcaObserver:
             ValueError: If shapes differ or a number is not finite.
         """
         runs = (len(truth) - 1, *truth.shape[2:]) if truth.ndim > 2 else None
-        if runs is None or truth.shape[1] != 4 or power.shape != runs:
+        if runs is None or truth.shape[1] != self._states or power.shape != runs:
             raise ValueError(
-                f"truth must have shape (k + 1, 4, ..., n) and power (k, ..., n), got {truth.shape}"
-                f" and {power.shape}"
+                f"truth must have shape (k + 1, {self._states}, ..., n) and power (k, ..., n), got"
+                f" {truth.shape} and {power.shape}"
             )
         ohms = self._read(truth[:, _L], truth[:, _T])[0]
-        estimate = replace(self.begin(ohms[0], truth[0, _T]), mean=truth[0])
+        estimate = self._begun(ohms[0], truth[0, _T], truth[0, _BODY], steady_power)
+        estimate = replace(estimate, mean=truth[0])
         rows = []
         for state, now, reading in zip(truth[1:], power, ohms[1:], strict=True):
             estimate = replace(self.predicted(estimate, now, dt), mean=state)
@@ -342,7 +384,8 @@ class TcaObserver:
         length = self.under_load(warm, np.full(self.bank.n, number("load", load)))
         mean = np.stack([warm, self.bank.heat.steady_body(warm), length, np.ones_like(warm)])
         model = TcaObserver(
-            self.bank, replace(self.spec, loss_error=1.0), resistance=self._resistance
+            self.bank, replace(self.spec, loss_error=1.0, load_bandwidth=0.0),
+            resistance=self._resistance,
         )
         moved, rows = np.eye(4), []
         for power in within("powers", powers.ravel(), at_least=0.0, unit="W"):
@@ -375,12 +418,46 @@ class TcaObserver:
             length = self._inside(length + (load - force) / slope)
         return length
 
+    def _rise(self, power: ArrayLike) -> Array:
+        """By how much TCAs are warmer than the surroundings once they rest under a power [K]."""
+        power = within("steady_power", power, at_least=0.0, unit="W")
+        return np.asarray(power / self.bank.heat.steady_loss)
+
+    def _begun(self, ohms: Array, warm: Array, body: Array, power: ArrayLike | None) -> Estimate:
+        """What a reading leaves open of TCAs and bodies that are believed as warm."""
+        length = np.broadcast_to(self.bank.rest_length, ohms.shape)
+        for _ in range(_NEWTON):
+            now, slope, _ = self._read(length, warm)
+            length = self._inside(length + (ohms - now) / slope)
+        _, slope, by_heat = self._read(length, warm)
+
+        # What the state is off by, over what is off by itself: T, T_b, the reading, r and the load.
+        spec, ones = self.spec, np.ones(ohms.shape)
+        error = np.zeros((self._states, self._states, *ohms.shape))
+        embedded = np.where(self.bank.embedded, 1.0, 0.0)
+        error[_T, _T], error[_BODY, _BODY] = spec.start_error * ones, spec.start_error * embedded
+        error[_R, _R] = spec.loss_error * ones
+        if power is not None:  # at rest T - T_amb is P r over the nominal loss, and T_b follows
+            heat, rise = self.bank.heat, self._rise(power)
+            error[_T, _R] = spec.loss_error * rise
+            error[_BODY, _R] = spec.loss_error * (heat.steady_body(heat.ambient + rise)
+                                                  - heat.ambient)  # fmt: skip
+        error[_L] = -by_heat / slope * error[_T]
+        error[_L, _L] = spec.resistance_noise / slope
+        mean = np.stack([warm, body, length, ones])
+        if self._returns:
+            force, stiffness, warmed = self._law(length, warm)
+            error[_M] = (stiffness + spec.load_stiffness) * error[_L] + warmed * error[_T]
+            error[_M, _M] = spec.tension_rate / np.sqrt(2.0 * self._returns)
+            mean = np.concatenate([mean, (force + spec.load_stiffness * length)[None]])
+        return Estimate(mean, np.einsum("ij...,kj...->ik...", error, error))
+
     def _moved(self, mean: Array, power: Array, dt: float) -> tuple[Array, Array, Array, Array]:
         """The state ``dt`` later, its derivatives by the state before, what a kelvin too much does
         to it, and how much the length gives to the load [m/N]."""
-        (warm, body, length, ratio), held = mean, self.spec.load_stiffness
+        (warm, body, length, ratio), held = mean[:_M], self.spec.load_stiffness
         power = np.broadcast_to(power, warm.shape)
-        heat, jacobian = self.bank.heat, np.zeros((4, 4, *warm.shape))
+        heat, jacobian = self.bank.heat, np.zeros((len(mean), *mean.shape))
         if self._adapts:
             ends = []
             for shift in (-_SHARE, _SHARE):
@@ -394,20 +471,32 @@ class TcaObserver:
         jacobian[_BODY, _T], jacobian[_BODY, _BODY] = step.given, 1.0 + step.body_own
         jacobian[_R, _R] = 1.0
 
-        # The load stays: F(l1, T1) + k l1 = F(l, T) + k l; two steps of Newton, and its slopes.
+        # The load stays: F(l1, T1) + k l1 = F(l, T) + k l; or it comes back to its mean by a share.
+        # Two steps of Newton, and its slopes.
         force, slope, by_heat = self._law(length, warm)
-        target, later = force + held * length, length
+        target, later, stays = force + held * length, length, 1.0
+        if self._returns:
+            stays = float(np.exp(-self._returns * dt))
+            target = stays * target + (1.0 - stays) * mean[_M]
         for _ in range(2):
             now, rise = self._pull(later, after)
             later = self._inside(later + (target - now - held * later) / (rise + held))
         _, rise, later_by_heat = self._law(later, after)
         give = 1.0 / (rise + held)
         jacobian[_L] = -later_by_heat * give * jacobian[_T]
-        jacobian[_L, _T] += by_heat * give
-        jacobian[_L, _L] += (slope + held) * give
+        jacobian[_L, _T] += stays * by_heat * give
+        jacobian[_L, _L] += stays * (slope + held) * give
+        if self._returns:
+            jacobian[_L, _M], jacobian[_M, _M] = (1.0 - stays) * give, 1.0
         heated = np.zeros_like(mean)
         heated[_T], heated[_L] = 1.0, -later_by_heat * give
-        return np.stack([after, after_body, later, ratio]), jacobian, heated, give
+        moved = np.stack([after, after_body, later, ratio, *mean[_M:]])
+        return moved, jacobian, heated, give
+
+    def _stirred(self, dt: float) -> float:
+        """Variance that the load gains in ``dt`` [N²]."""
+        rate, fast = self.spec.tension_rate, 2.0 * self._returns
+        return rate**2 * (-float(np.expm1(-fast * dt)) / fast if fast else dt)
 
     def _pull(self, length: Array, temperature: Array) -> tuple[Array, Array]:
         """Tension [N] and its slope over length [N/m]."""
