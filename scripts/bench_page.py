@@ -514,9 +514,11 @@ def pictures(out: Path) -> None:
             left.plot(x, 100.0 * pairs[:, 0], ".", color=shade, ms=8)
         left.set_xticks(x, [name.replace(", ", ",\n").replace(": ", ":\n")
                             for name in excitations()], fontsize=6)  # fmt: skip
-        left.set(ylabel="error of the force [% of 20 g]", yscale="log",
+        left.set(ylabel="error of the force [% of 20 g]", yscale="log", ylim=(0.8, 40.0),
                  title="heat loss known to 20 %")  # fmt: skip
-        left.legend(fontsize=7)
+        left.set_yticks([1, 2, 5, 10, 20], ["1", "2", "5", "10", "20"])
+        left.set_yticks([], minor=True)
+        left.legend(fontsize=7, loc="lower left", ncols=3)
         for value, shade in ((7.0, green), (28.0, orange)):
             time, length, tension = held("impedance", 1.0, value)
             late = time > 12.0

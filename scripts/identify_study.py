@@ -16,8 +16,8 @@ from pathlib import Path
 
 import numpy as np
 
-from tca_mj.files import append_whole, write_whole
-from tca_mj.pages import table
+from tca_mj.files import append_whole
+from tca_mj.pages import table, write_between
 from tca_mj.tca import CATALOGUE, TcaSpec
 from tca_mj.tca.identify import constants_of, identify, simulated_bench, with_constants
 from tca_mj.tca.identify.constants import CONSTANTS, encoded
@@ -27,7 +27,7 @@ from tca_mj.validation.residuals import residuals_picture
 
 CASES, ROWS = 200, 100
 DOCS = Path(__file__).resolve().parent.parent / "docs"
-HELD, GAINS, END = "<!-- intervals -->", "<!-- gains -->", "<!-- end -->"
+HELD, GAINS = "intervals", "gains"
 ORDER = ("stretch.csv", "length.csv", "force.csv", "step.csv", "resistance.csv")
 _THREAD = CATALOGUE["free-stroke"]
 _PLAIN = replace(_THREAD.fibre, load_softening=(0.0, 0.0, 1.0))
@@ -147,15 +147,6 @@ def draw_pictures() -> None:
             residuals_picture(found, data, path)
 
 
-def in_page(mark: str, lines: list[str]) -> None:
-    """Puts a table into the page, between its marks."""
-    path = DOCS / "identification.md"
-    before, _, rest = path.read_text(encoding="utf-8").partition(mark)
-    _, _, after = rest.partition(END)
-    text = "\n".join([mark, "", *lines, "", END])
-    write_whole(path, f"{before}{text}{after}".encode())
-
-
 def main() -> None:
     """Goes on with the cases, and prints the table or writes it into the page."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
@@ -178,7 +169,7 @@ def main() -> None:
     for mark, rows in ((HELD, held), (GAINS, gains())):
         print("\n".join(rows), end="\n\n")
         if asked.page:
-            in_page(mark, rows)
+            write_between(DOCS / "identification.md", mark, rows)
     if asked.pictures:
         draw_pictures()
 
