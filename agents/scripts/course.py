@@ -60,6 +60,8 @@ class Go(Checked):
         patience: Time without headway after which the stage ends wherever the body is [s].
         steers: Whether the legs of one side become weaker where the heading is off.
         above: Height of what the robot stands on, of which a learned gait sees its own [m].
+        clings: Whether the spines' TCAs go on pulling: without them a rigid U gives way by a
+            degree, which is all that weak ones have clamped by.
     """
 
     name: str
@@ -68,6 +70,7 @@ class Go(Checked):
     patience: Edge = math.inf
     steers: bool = False
     above: float = 0.0
+    clings: bool = False
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -143,6 +146,7 @@ class CourseWalker:
     warm = 80.0  # spines are warmed to this ahead of a change of shape, and still rigid [°C]
     walkable = np.radians(88.0)  # least bend at which it stands on its feet [rad]
     easing = 0.3  # by which the TCAs cool while spines that cool fast become stiff [K/s]
+    clinging = 0.05  # the same of rigid ones that still pull [K/s]
     hottest = 172.0  # temperature that no TCA is to exceed [°C]
     stalled = 35.0  # time without headway after which another gait is tried [s]
 
@@ -208,7 +212,8 @@ class CourseWalker:
             stage = self._plan[self._number]
             if isinstance(stage, Go):
                 # To relax is harmless, to contract is not.
-                self._held = self._held - self.easing * self._dt if blows else _OFF
+                eased = self._held - (self.easing if blows else self.clinging) * self._dt
+                self._held = eased if blows or stage.clings else _OFF
                 legs, spines = self._walk(stage, seen), self._held
                 voltage = self._warmed(stage, seen)
             else:

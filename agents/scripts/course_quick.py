@@ -52,18 +52,18 @@ def quick(places: Places, gaits: Mapping[str, Any]) -> tuple[Go | Bend, ...]:
     station, edge, end = places.leg_station, places.first_edge, places.beam_end
     walking, wide = math.radians(95.0), math.radians(115.0)
     crawl, walk = gaits["crawl"], gaits["walk"]
+    astride: dict[str, Any] = {"gait": gaits["shimmy"], "above": places.beam_top, "clings": True}
     brisk: dict[str, Any] = {"brisk": True, "stiff": 88.0, "rest": 0.0}
     return (
         Go(name="crawl", gait=crawl, until=places.stand, steers=True),
         Bend(name="stand up", angle=walking, steps=WALK, ahead=0.03, **brisk),
         Go(name="walk", gait=walk, until=edge - station + 0.019, steers=True),
-        Go(name="mount", gait=gaits["mount"], until=edge + station + 0.004, patience=25.0,
+        # A robot that falls back as it comes to lie on the beam needs a minute to make up for it.
+        Go(name="mount", gait=gaits["mount"], until=edge + station + 0.004, patience=90.0,
            steers=True),
         Bend(name="clamp", angle=math.radians(213.0), reaching=True, ahead=0.01, **brisk),
-        Go(name="shimmy", gait=gaits["shimmy"], until=end - 0.005, patience=200.0,
-           above=places.beam_top),
-        Go(name="step off", gait=gaits["shimmy"], until=end + station - 0.015, patience=60.0,
-           above=places.beam_top),
+        Go(name="shimmy", until=end - 0.005, patience=200.0, **astride),
+        Go(name="step off", until=end + station - 0.015, patience=60.0, **astride),
         *(
             Bend(name="open", angle=math.radians(angle), steps=STEP, braced=True, enough=wide,
                  **{**brisk, "rest": 10.0})
