@@ -278,6 +278,20 @@ def test_a_body_that_is_open_is_not_opened_again(degrees, stage):
     assert walker.phase == stage
 
 
+@pytest.mark.parametrize("clings", [False, True])
+def test_spines_go_on_pulling_once_they_are_rigid_only_where_the_robot_clings(clings):
+    """They ease by 0.05 K/s: to relax is harmless, to contract against a rigid spine is not."""
+    env = TetrapodCourse(action="power")
+    observation, _ = env.reset(seed=0)
+    walker = CourseWalker(env, (Go(name="shimmy", gait=STEP, until=1.0, clings=clings),))
+    assert OBSERVATION.read(observation)["spine temperature"].max() < walker.rigid
+    walker._held = 160.0
+    for _ in range(10):
+        action = walker.act(observation)
+    assert walker._held == pytest.approx(159.95 if clings else 25.0)
+    assert np.all(action[12:15] > -1.0) == clings
+
+
 def test_the_crawl_goes_forward_and_the_walk_is_faster():
     """A few cycles of each; over the whole course the demo prints the speeds."""
     speeds = {}
