@@ -403,12 +403,14 @@ class Simulation:
         if kind == "motor":
             data, ids = self.data, [self.model.actuator(name).id for name in self.motors]
             slides = self.model.jnt_type[self.model.actuator_trnid[ids, 0]] == _SLIDE
-            place, load = ("m", "N") if slides.all() else ("m or rad", "N or N m")
+            place, speed, load = (
+                ("m", "m/s", "N") if slides.all() else ("m or rad", "m/s or rad/s", "N or N m")
+            )
             return Group(
                 kind=kind, names=self.motors, channels={"ctrl": "-"},
                 signals={
                     "position": Signal(place, data.actuator_length[ids]),
-                    "velocity": Signal(f"({place})/s", data.actuator_velocity[ids]),
+                    "velocity": Signal(speed, data.actuator_velocity[ids]),
                     "force": Signal(load, data.actuator_force[ids]),
                 },
             )  # fmt: skip

@@ -26,7 +26,9 @@ HEATER_QUANTITIES = {"voltage": "Spine heaters [V]", "temperature": "Spines [°C
 
 _LIGHTNESS = 0.75  # of the curves, on Rerun's dark ground
 _LEGEND = 8  # curves whose names still fit beside a plot; the others show theirs when pointed at
+_ROWS = 6  # of curves that are legible one above the other; of more, the last are tabs
 _BACKGROUND = (226, 230, 236)
+_AWAY = 1.05  # of the eye, over the size of what is there to be seen
 
 
 class Group(NamedTuple):
@@ -98,6 +100,8 @@ def blueprint(
 ) -> layout.Blueprint:
     """Robot to the left above reward and events, curves to the right, time standing still.
 
+    The resistance, which is the length once more, comes last.
+
     Args:
         shown: The curves.
         centre: Where to look, shape (3,) [m].
@@ -105,7 +109,7 @@ def blueprint(
         ground: Height of the ground [m]; None without one.
     """
     away = np.array([0.55, -0.75, 0.4])
-    eye = centre + 1.35 * size * away / np.linalg.norm(away)
+    eye = centre + _AWAY * size * away / np.linalg.norm(away)
     grid = layout.LineGrid3D(visible=False)
     if ground is not None:
         plane = rerun.components.Plane3D.XY.with_distance(ground + 5e-4 * size)
@@ -119,13 +123,15 @@ def blueprint(
     scene = layout.Spatial3DView(
         origin="/world", name="Robot", background=_BACKGROUND, line_grid=grid, eye_controls=view
     )
-    curves = [
+    curves: list[Any] = [
         layout.TimeSeriesView(origin="/", contents=group.paths, name=group.title,
                               plot_legend=layout.PlotLegend(
                                   corner=layout.Corner2D.RightTop,
                                   visible=group.legend and len(group.paths) <= _LEGEND))
-        for group in shown
+        for group in sorted(shown, key=lambda group: group.title == QUANTITIES["resistance"])
     ]  # fmt: skip
+    if len(curves) > _ROWS:
+        curves[_ROWS - 1 :] = [layout.Tabs(*curves[_ROWS - 1 :])]
     reward = layout.TimeSeriesView(origin="/reward", name="Reward")
     columns = layout.TextLogColumns(timeline_columns=["sim_time"], text_log_columns=["body"])
     events = layout.TextLogView(origin="/events", name="Events", columns=columns)
