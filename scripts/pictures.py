@@ -16,9 +16,9 @@ from tca_mj.envs.arm import ArmPickPlace
 from tca_mj.record.render import Offscreen, colour_tendons
 
 # Time after the start of each phase at which its picture is taken [s].
-MOMENTS = {"align": 1.0, "open": 3.0, "lower": 1.5, "pinch": 1.0, "lift": 1.5, "turn back": 6.0,
-           "bend": 5.5, "release": 1.0}  # fmt: skip
-HERO = ("bend", 5.5)
+MOMENTS = {"align": 0.5, "open": 0.8, "lower": 0.5, "pinch": 0.4, "lift": 0.3, "turn back": 0.0,
+           "bend": 1.2, "release": 1.0}  # fmt: skip
+HERO = ("bend", 1.5)
 
 
 def view(distance: float, azimuth: float, height: float, elevation: float) -> mujoco.MjvCamera:

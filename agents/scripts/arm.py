@@ -1,7 +1,9 @@
 """Scripted agents: feedback on what the robot senses, no replay.
 
 ``PickAndPlace`` follows Sun, Section 4.1.4 and Fig. 5.6: align the wrist, open, lower, pinch,
-lift, turn back, bend towards the cup, release.
+lift, turn back, bend towards the cup, release. What need not wait does not: the gripper opens from
+the start, the bending module is warmed up to the lift, and the wrist turns back, as far as it does,
+while the arm bends.
 """
 
 from __future__ import annotations
@@ -34,28 +36,41 @@ class PickAndPlaceGains(Checked):
         hottest: Temperature that no TCA is asked to pass [°C].
         settling: Time in which a TCA is brought to a temperature [s].
         averaging: Time over which positions are averaged [s].
-        bend_rate: Temperature asked for per offset of the gripper and second [K/(m s)].
-        bend_now: Temperature asked for per offset of the gripper [K/m].
+        align_rate: Temperature asked for per offset of the gripper from the object and second
+            [K/(m s)].
+        align_now: Temperature asked for per such offset [K/m].
+        bend_rate: Temperature asked for per offset of the object from the cup and second [K/(m s)].
+        bend_now: Temperature asked for per such offset [K/m].
         brace: Rise of all three bending TCAs over the largest that the bend asks for. Pulling
             against each other they hold the soft body: strongly bent by one side alone it would
             roll over, from about 130 °C on.
-        wrist_slope: Rise of temperature that turns the wrist by one radian [K/rad].
-        opening_slope: Rise of temperature that opens the gripper by one metre [K/m].
-        clearance: Opening beyond the object's width [m].
-        grasp_depth: How far below the object's centre the finger tips close, over its width [1].
-        aligned: Offset of the gripper with which it goes down [m].
-        aligned_yaw: Misalignment of the wrist with which it goes down [rad].
-        over_cup: Offset of the object from the cup's axis at which it is let go [m].
+        warm: Rise of all three bending TCAs up to the lift, on top of what aligns the gripper: with
+            at most 2 W each they would need seconds to warm up for the bend [K].
+        warm_rate: How fast it grows, so that power is left to align the gripper [K/s].
+        wrist_slope: Temperature asked for per misalignment of the wrist [K/rad].
+        opening_slope: Temperature asked for per missing opening [K/m].
+        clearance: Opening beyond the object's width that is asked for; twice it to let go [m].
+        opened: The same with which the gripper goes down, while it goes on opening [m].
+        grasp_depth: How far below the object's centre the finger tips close [m].
+        aligned: Offset of the gripper with which it goes down and closes [m].
+        aligned_yaw: Misalignment of the wrist with which it closes; with twice it goes down [rad].
+        over_cup: Offset of the object from the cup's axis at which it is let go; at twice it goes
+            down [m].
         patience: Time after which half as much again is near enough: the arm cannot reach
             further without getting too hot [s].
-        turning_back: Time that the wrist is given to turn back [s]. Its silicone, warm by then,
-            keeps it turned for minutes; the cup is round.
+        turning_back: Time that the wrist is given to turn back before the arm bends [s]. Its
+            silicone, warm by then, keeps it turned for minutes; the cup is round.
+        lifted: Height of the object at which the arm begins to bend; at 33 mm the task calls it
+            carried [m].
         carry_height: Height of the object while it is carried [m].
         drop_height: Height of the object when it is let go [m].
+        released: Height of the object below which it is out of the fingers [m].
         hover: Height above the object at which the gripper is aligned and opened [m].
-        climb_rate: Velocity of the base over the missing height, without an object [1/s].
-        carry_rate: The same with an object [1/s].
+        climb_rate: Velocity of the base over the missing height, to there [1/s].
+        lower_rate: The same to the object, and while the fingers close round it [1/s].
+        carry_rate: The same with the object [1/s].
         calm: Time without a change of the opening after which the fingers hold [s].
+        still: Change of the opening in a step that is none [m].
         cool: Temperature of the gripper's TCA over its silicone's at which they do in any case, as
             the silicone keeps the TCA warm for minutes [K].
         slipped: Depth of the object below the finger tips at which it counts as lost [m].
@@ -65,28 +80,37 @@ class PickAndPlaceGains(Checked):
         ValueError: If a number is not finite or negative, or a time 0.
     """
 
-    hottest: Temperature = 160.0
-    settling: Positive = 0.6
-    averaging: Positive = 0.6
-    bend_rate: NotNegative = 2000.0
-    bend_now: NotNegative = 1500.0
+    hottest: Temperature = 155.0
+    settling: Positive = 0.35
+    averaging: Positive = 0.25
+    align_rate: NotNegative = 4000.0
+    align_now: NotNegative = 3000.0
+    bend_rate: NotNegative = 4000.0
+    bend_now: NotNegative = 3500.0
     brace: NotNegative = 0.55
+    warm: NotNegative = 80.0
+    warm_rate: NotNegative = 20.0
     wrist_slope: NotNegative = 45.0
-    opening_slope: NotNegative = 1e4
-    clearance: NotNegative = 5.5e-3
-    grasp_depth: NotNegative = 0.2
-    aligned: NotNegative = 1.0e-3
-    aligned_yaw: NotNegative = 0.07
-    over_cup: NotNegative = 6e-3
+    opening_slope: NotNegative = 3e4
+    clearance: NotNegative = 3.8e-3
+    opened: NotNegative = 0.95e-3
+    grasp_depth: NotNegative = 2e-3
+    aligned: NotNegative = 2e-3
+    aligned_yaw: NotNegative = 0.12
+    over_cup: NotNegative = 8.5e-3
     patience: Positive = 12.0
-    turning_back: Positive = 6.5
-    carry_height: NotNegative = 45e-3
-    drop_height: NotNegative = 27e-3
-    hover: NotNegative = 20e-3
-    climb_rate: NotNegative = 1.4
-    carry_rate: NotNegative = 0.8
-    calm: NotNegative = 0.8
-    cool: NotNegative = 2.0
+    turning_back: Positive = 0.05
+    lifted: NotNegative = 33.5e-3
+    carry_height: NotNegative = 37e-3
+    drop_height: NotNegative = 25e-3
+    released: NotNegative = 19e-3
+    hover: NotNegative = 14e-3
+    climb_rate: NotNegative = 2.0
+    lower_rate: NotNegative = 5.0
+    carry_rate: NotNegative = 2.5
+    calm: NotNegative = 0.1
+    still: NotNegative = 2e-4
+    cool: NotNegative = 13.0
     slipped: NotNegative = 8e-3
     phase_limit: Positive = 40.0
 
@@ -115,7 +139,7 @@ class PickAndPlace(Checked):
         """Starts anew."""
         self.phase, self.since, self.tries = "align", 0.0, 1
         self._bend = np.zeros(2)
-        self._calm = self._opening = self._height = 0.0
+        self._time = self._calm = self._opening = self._height = 0.0
         self._mean: Array | None = None
         self._body = np.array(self._heat.ambient)  # what the TCAs lie in: not seen, but followed
 
@@ -128,27 +152,29 @@ class PickAndPlace(Checked):
         self._mean += _DT / self.gains.averaging * ([seen.gripper, seen.object] - self._mean)
         seen.gripper, seen.object = self._mean
         self.since += _DT
-        self._calm = self._calm + _DT if abs(seen.opening - self._opening) < 2e-5 else 0.0
+        self._time += _DT
+        unchanged = abs(seen.opening - self._opening) < self.gains.still
+        self._calm = self._calm + _DT if unchanged else 0.0
         self._opening = seen.opening
         following = self._next(seen)
         if following != self.phase:
             if following == "open" and self.phase in ("pinch", "lift"):
                 self.tries += 1
             self.phase, self.since, self._calm = following, 0.0, 0.0
-            self._height = seen.object[2] - self.gains.grasp_depth * seen.width
+            self._height = seen.object[2] - self.gains.grasp_depth
         return self._command(seen)
 
     def _next(self, seen: _Seen) -> str:
         """The phase after this one if its goal is reached, else the same."""
         gains, late = self.gains, self.since > self.gains.phase_limit
         offset = float(np.linalg.norm(seen.object[:2] - seen.gripper[:2]))
-        aligned = offset < gains.aligned and abs(seen.misaligned) < gains.aligned_yaw
+        near, turned = offset < gains.aligned, abs(seen.misaligned) < gains.aligned_yaw
         match self.phase:
-            case "align" if aligned or late:
+            case "align" if near and abs(seen.misaligned) < 2.0 * gains.aligned_yaw or late:
                 return "open"
-            case "open" if seen.opening > seen.width + 0.9 * gains.clearance or late:
+            case "open" if seen.opening > seen.width + gains.opened or late:
                 return "lower"
-            case "lower" if abs(seen.tips - self._height) < 4e-4 or late:
+            case "lower" if near and turned and abs(seen.tips - self._height) < 4e-4 or late:
                 return "pinch"
             case "pinch" if (
                 self._calm > gains.calm
@@ -157,7 +183,7 @@ class PickAndPlace(Checked):
                 return "lift"
             case "lift" if self.since > 1.0 and seen.object[2] < seen.gripper[2] - gains.slipped:
                 return "open" if self.tries < 3 else "done"
-            case "lift" if seen.object[2] > gains.carry_height - 2e-3 or late:
+            case "lift" if seen.object[2] > gains.lifted or late:
                 return "turn back"
             case "turn back" if abs(seen.yaw) < 0.2 or self.since > gains.turning_back or late:
                 return "bend"
@@ -177,17 +203,17 @@ class PickAndPlace(Checked):
         error = np.zeros(2)
         if phase in ("align", "open", "lower"):
             error = seen.object[:2] - seen.gripper[:2]
-            target[_WRIST] = seen.temperature[_WRIST] + 0.5 * gains.wrist_slope * seen.misaligned
+            target[_WRIST] = seen.temperature[_WRIST] + gains.wrist_slope * seen.misaligned
         elif phase == "pinch":
             target[_WRIST] = seen.temperature[_WRIST]
         elif phase in ("lift", "turn back"):
             self._bend *= 0.9  # straight again
-        elif phase == "bend":
+        elif phase == "bend" or self._holds(seen):
             error = seen.cup[:2] - seen.object[:2]
         target[_BENDING] = self._steer(seen, error)
-        if phase in ("open", "lower", "release"):
-            wanted = seen.width + gains.clearance * (1.5 if phase == "release" else 1.0)
-            target[_GRIPPER] = seen.temperature[_GRIPPER] + 0.5 * gains.opening_slope * (
+        if phase in ("align", "open", "lower", "release"):
+            wanted = seen.width + gains.clearance * (2.0 if phase == "release" else 1.0)
+            target[_GRIPPER] = seen.temperature[_GRIPPER] + gains.opening_slope * (
                 wanted - seen.opening
             )
         power = self._power(seen.temperature, np.minimum(target, gains.hottest))
@@ -207,16 +233,27 @@ class PickAndPlace(Checked):
 
         Proportional and integral; a TCA bends the arm to its own side.
         """
-        self._bend = self._bend + self.gains.bend_rate * _DT * error
-        wanted = self._bend + self.gains.bend_now * error
+        gains, bending = self.gains, self.phase in ("bend", "release", "done")
+        rate, now = (
+            (gains.bend_rate, gains.bend_now) if bending else (gains.align_rate, gains.align_now)
+        )
+        self._bend = self._bend + rate * _DT * error
+        wanted = self._bend + now * error
         share = (2.0 / 3.0) * _SIDES @ wanted
         share -= share.min()
-        excess = share.max() + seen.ambient - self.gains.hottest
+        excess = share.max() + seen.ambient - gains.hottest
         if excess > 0.0:  # no wind-up against the hottest temperature
             self._bend *= 1.0 - excess / share.max()
             share *= 1.0 - excess / share.max()
-        brace = self.gains.brace * share.max()
-        return seen.ambient + np.maximum(share, brace)
+        share = np.maximum(share, gains.brace * share.max())
+        if not bending:
+            room = gains.hottest - seen.ambient - share.max()
+            share += min(gains.warm, gains.warm_rate * self._time, room)
+        return seen.ambient + share
+
+    def _holds(self, seen: _Seen) -> bool:
+        """Whether the object is still in the fingers that let it go."""
+        return self.phase == "release" and bool(seen.object[2] > self.gains.released)
 
     def _climb(self, seen: _Seen) -> float:
         """Velocity of the base [m/s]."""
@@ -224,18 +261,18 @@ class PickAndPlace(Checked):
         match self.phase:
             case "align" | "open":
                 return gains.climb_rate * (seen.object[2] + gains.hover - seen.gripper[2])
-            case "lower":
-                return gains.climb_rate * (self._height - seen.tips)
+            case "lower" | "pinch":  # the arm gets shorter as it warms up
+                return gains.lower_rate * (self._height - seen.tips)
             case "lift" | "turn back":
                 return gains.carry_rate * (gains.carry_height - seen.object[2])
             case "bend":
-                near = np.linalg.norm(seen.object[:2] - seen.cup[:2]) < 1.5 * gains.over_cup
+                near = np.linalg.norm(seen.object[:2] - seen.cup[:2]) < 2.0 * gains.over_cup
                 height = gains.drop_height if near else gains.carry_height
                 return gains.carry_rate * (height - seen.object[2])
-            case "done":
-                return 0.5 * self.arm_spec.speed  # up and out of the way
+            case "release" if self._holds(seen):
+                return gains.carry_rate * (gains.drop_height - seen.object[2])
             case _:
-                return 0.0  # pinch and release
+                return 0.5 * self.arm_spec.speed  # up and out of the way
 
 
 # Unit vectors in the world towards which the three TCAs bend the hanging arm: the module's x

@@ -181,7 +181,7 @@ def scripted(name: str, *, seed: int = 0, limit: float = 120.0) -> Course:
         seed: Seed of the episode.
         limit: Time after which to stop [s].
     """
-    task, policy, course = ArmPickPlace(), PickAndPlace(), Course()
+    task, policy, course = ArmPickPlace(action="power"), PickAndPlace(), Course()
     seen, _ = task.reset(seed=seed, options={"object": name})
     course.sample(task.sim, policy.phase, "arm.")
     while not course.ending:
