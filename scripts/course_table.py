@@ -14,7 +14,7 @@ docs/course.json, by seed, and from there in docs/course.md.
 import argparse
 import json
 import shutil
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
@@ -31,7 +31,9 @@ NAMES = tuple(TetrapodCourse.published_speed)  # of the gaits that were publishe
 WALKED = ("crawl", "walk", "mount", "shimmy", "step off", "walk on")  # stages that get on
 HEADS = ["seed", "friction", "finished", "time", *(f"{name} [mm/s]" for name in NAMES), "energy",
          "hottest", "largest tension"]  # fmt: skip
-SHARE, SHARE_WALKED = 0.7, 0.55  # of the script's time: what is aimed at
+SCRIPT = "everything"  # its runs on robots that are off in everything
+CONTROLLERS = {SCRIPT: "script", "searched": "search", "specialists": "specialists",
+               "shapes": "one policy"}  # fmt: skip
 
 
 def figures(
@@ -72,46 +74,55 @@ def walked(row: dict[str, Any]) -> float:
     return sum(row["stages"].get(name, 0.0) for name in WALKED)
 
 
+def by_seed(kept: dict[str, Any]) -> dict[int, dict[str, dict[str, Any]]]:
+    """Rows of each controller on the seeds that the script and another one were given."""
+    found: dict[int, dict[str, dict[str, Any]]] = {}
+    for name in CONTROLLERS:
+        for row in kept.get(name, ()):
+            if row.get("stages"):
+                found.setdefault(row["seed"], {})[name] = row
+    return {seed: rows for seed, rows in sorted(found.items()) if len(rows) > 1 and SCRIPT in rows}
+
+
 def stage_table(kept: dict[str, Any]) -> list[str]:
-    """Mean and longest time in each stage over the seeds that several have finished."""
-    both = shared(kept)
-    names = [name for name in both[0][0]["stages"] if name != "done"]
+    """Mean and longest time in each stage, over the runs of each controller that finished."""
+    seeds = by_seed(kept)
     rows = []
-    for name in names:
-        spans = [[pair[i]["stages"].get(name, 0.0) for pair in both if not pair[i]["ending"]]
-                 for i in range(2)]  # fmt: skip
-        rows.append([name, *(f"{np.mean(each):.0f} s, at most {max(each):.0f} s"
-                             for each in spans)])  # fmt: skip
-    return table(["stage", "script", "specialists"], rows)
+    for name in next(iter(seeds.values()))[SCRIPT]["stages"]:
+        cells = [name]
+        for who in CONTROLLERS:
+            spans = [rows[who]["stages"].get(name, 0.0) for rows in seeds.values()
+                     if who in rows and not rows[who]["ending"]]  # fmt: skip
+            cells.append(f"{np.mean(spans):.0f} s, at most {max(spans):.0f} s" if spans else "")
+        rows.append(cells)
+    return table(["stage", *CONTROLLERS.values()], [row for row in rows if row[0] != "done"])
 
 
-def shared(kept: dict[str, Any]) -> list[tuple[dict[str, Any], dict[str, Any]]]:
-    """Rows of script and specialists with the same seed, whose stages are known."""
-    script = {row["seed"]: row for row in kept["everything"] if row.get("stages")}
-    return [(script[row["seed"]], row) for row in kept["specialists"] if row["seed"] in script]
-
-
-def quick_table(kept: dict[str, Any]) -> list[str]:
-    """The learned gaits beside the script, seed by seed, and how often the aims are met."""
-    rows, whole, legs = [], 0, 0
-    for script, quick in shared(kept):
-        share, own = quick["duration"] / script["duration"], walked(quick) / walked(script)
-        fine = not quick["ending"] and not quick["harmed"]
-        whole, legs = whole + (fine and share <= SHARE), legs + (fine and own <= SHARE_WALKED)
-        shares = [f"{100 * each:.0f} %" if not quick["ending"] else "" for each in (share, own)]
-        rows.append([
-            str(quick["seed"]), f"{script['duration']:.0f} s",
-            f"no: {quick['ending']} after {quick['duration']:.0f} s" if quick["ending"]
-            else f"{quick['duration']:.0f} s", shares[0], f"{walked(script):.0f} s",
-            f"{walked(quick):.0f} s", shares[1],
-        ])  # fmt: skip
-    heads = ["seed", "script", "specialists", "share", "walked, script", "walked, specialists",
-             "share"]  # fmt: skip
-    said = (
-        f"At most {100 * SHARE:.0f} % of the script's time on {whole} of {len(rows)} seeds, and at"
-        f" most {100 * SHARE_WALKED:.0f} % of it in the walked stages on {legs}."
-    )
-    return [*table(heads, rows), "", said]
+def time_table(kept: dict[str, Any], measure: Callable[[dict[str, Any]], float], most: float,
+               words: str) -> list[str]:  # fmt: skip
+    """A time of every controller, seed by seed, over the script's, and how often that is met."""
+    seeds, rows = by_seed(kept), []
+    met = dict.fromkeys(CONTROLLERS, 0)
+    tried = dict.fromkeys(CONTROLLERS, 0)
+    for seed, found in seeds.items():
+        cells = [str(seed)]
+        for who in CONTROLLERS:
+            if who not in found:
+                cells.append("")
+                continue
+            row, share = found[who], measure(found[who]) / measure(found[SCRIPT])
+            if row["ending"]:
+                cells.append(f"no: {row['ending']}, {row['duration']:.0f} s")
+            else:
+                cells.append(f"{measure(row):.0f} s ({100 * share:.0f} %)" if who != SCRIPT
+                             else f"{measure(row):.0f} s")  # fmt: skip
+            tried[who] += 1
+            met[who] += not row["ending"] and not row["harmed"] and share <= most
+        rows.append(cells)
+    said = ", ".join(f"{CONTROLLERS[who]} on {met[who]} of {tried[who]}" for who in CONTROLLERS
+                     if who != SCRIPT and tried[who])  # fmt: skip
+    heads = ["seed", *(f"{name}, {words}" for name in CONTROLLERS.values())]
+    return [*table(heads, rows), "", f"At most {100 * most:.0f} % of the script's time: {said}."]
 
 
 def write_page(kept: dict[str, Any]) -> None:
@@ -119,7 +130,11 @@ def write_page(kept: dict[str, Any]) -> None:
     tables: dict[str, Iterable[str]] = {
         name: table(HEADS, map(cells, kept[name])) for name in ("friction", "everything")
     }
-    tables |= {"stages": stage_table(kept), "quick": quick_table(kept)}
+    tables |= {
+        "stages": stage_table(kept),
+        "whole": time_table(kept, lambda row: row["duration"], 0.7, "all of it"),
+        "walked": time_table(kept, walked, 0.55, "walked"),
+    }
     for name, lines in tables.items():
         write_between(PAGE, f"scripts/course_table.py: {name}", lines)
 
