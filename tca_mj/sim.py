@@ -68,6 +68,7 @@ MOST_SUBSTEPS, MOST_STEPS = 10_000, 1_000_000
 # Physics steps after which is looked whether the state has diverged: one that is no number takes
 # the solver all its iterations, of a robot with many contacts half a second for each step.
 _RUN = 5
+_NO_WARNING = bytes(4 * int(mujoco.mjtWarning.mjNWARNING))  # how many there were of each kind
 _SLIDE = int(mujoco.mjtJoint.mjJNT_SLIDE)
 _SNAPPING = int(mujoco.mjtIntegrator.mjINT_IMPLICITFAST)
 
@@ -513,7 +514,7 @@ class Simulation:
         self._hand_over(pull)
         for done in range(0, substeps, _RUN):
             mujoco.mj_step(model, data, min(_RUN, substeps - done))
-            if data.warning.number.any():
+            if data.warning.number.tobytes() != _NO_WARNING:
                 self._check()
 
     def checked(self, command: ArrayLike, voltage: ArrayLike, fan: ArrayLike) -> Inputs:

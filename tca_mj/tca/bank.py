@@ -318,8 +318,7 @@ class TcaBank:
         )  # fmt: skip
         within("power", power, at_least=0.0, unit="W")
         step = self._heating
-        known = step is not None and step.heat is self.heat and isinstance(dt, float | int)
-        if step is None or not (known and step.dt == dt):
+        if step is None or step.heat is not self.heat or type(dt) is not float or step.dt != dt:
             step = self._heating = HeatStep.of(self.heat, dt)
         temperature, body, lost = step.advance(state.temperature, state.body, power)
         molten = temperature > self.melting_temperature
