@@ -87,7 +87,7 @@ class SmoothBody:
         self._tca = np.array([i for i, tca in enumerate(tcas) for _ in tca.crossings], np.int64)
         self._cell = np.array([number[tuple(c.joints.values())] for c in crossings], np.int64)
         self._read_cells(list(cells.values()))
-        self._curves = Curves(crossings, self._cell, self._shape[1])
+        self._curves = Curves(crossings, self._cell, self._moves())
         self._lengths, self._twists = Total(self._tca, len(tcas)), Total(self._cell, self._shape[1])
         motions = rows(0, 1, 2, 3, width=self._shape[1], columns=self._cell)
         self._pulling = np.tile(self._tca, 4)
@@ -137,6 +137,14 @@ class SmoothBody:
         self._qpos, self._dof = model.jnt_qposadr[self._joint], model.jnt_dofadr[self._joint]
         self.damping.flat[self._where] = model.dof_damping[self._dof]
         self.stiffness.flat[self._where] = model.jnt_stiffness[self._joint]
+
+    def _moves(self) -> NDArray[np.bool_]:
+        """Which motions the cells can have, shape (4, cells): several hinges turn about any axis."""
+        moves = np.zeros(self._shape, np.bool_)
+        moves.flat[self._where] = True
+        if not self._planar:
+            moves[1:] = True
+        return moves
 
     def _read_turns(self, order: Array, row: Callable[..., Places]) -> None:
         """The products that rotations of cells are made of.
