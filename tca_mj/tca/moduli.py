@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from tca_mj.checks import Array, door, floats, within
-from tca_mj.tca.arrays import column, frozen
+from tca_mj.tca.arrays import ONE, ZERO, column, frozen
 from tca_mj.tca.thread import FibreSpec
 
 
@@ -164,10 +164,10 @@ def softened(
     rise = temperature - fibre.reference_temperature
     mu2, mu1, mu0 = fibre.load_softening
     fall = fibre.softening_rate * rise
-    unloaded = within(_LEFT, 1.0 - fall * mu0, above=0.0)
+    unloaded = within(_LEFT, ONE - fall * mu0, above=0.0)
     # Zero for a pushed or a cold coil, which leaves F = f (1 - k mu0).
-    load = np.maximum(stiff, 0.0) * np.maximum(fall, 0.0) * torsion_per_tension
-    linear = load * mu1 + 1.0
+    load = np.maximum(stiff, ZERO) * np.maximum(fall, ZERO) * torsion_per_tension
+    linear = load * mu1 + ONE
     twice = load + load  # twice and again: 4 load
     root = twice * mu2 * torsion_per_tension * (stiff + stiff) * unloaded
     root = np.sqrt(linear * linear + root)
