@@ -89,6 +89,7 @@ def advance(
     Raises:
         ValueError, TcaMelted, CoilSolveError: As ``TcaBank.advance``.
     """
+    gain = np.asarray(gain)
     if not spines.n:
         later, pull = bank.advance(tca, inputs.command, length, period)
         return later, Pull(pull.tension * gain, pull.stiffness * gain, length)

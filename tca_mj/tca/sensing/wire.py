@@ -43,7 +43,7 @@ from tca_mj.checks import (
     whole,
     within,
 )
-from tca_mj.tca.arrays import column
+from tca_mj.tca.arrays import ONE, ZERO, column
 from tca_mj.tca.spec import TcaSpec
 
 
@@ -100,9 +100,10 @@ def resistance(
     instance("wire", wire, WireTable)
     temperature, length = floats("temperature", temperature), floats("length", length)
     with np.errstate(invalid="ignore"):
-        short = 1.0 - length / wire.rest_length
-        left = np.where(short < 0.0, wire.stretch, wire.contraction) * short + 1.0
-    good = (np.minimum(length, left) > 0.0) & np.isfinite(temperature)
+        short = ONE - length / wire.rest_length
+        left = np.where(short < ZERO, wire.stretch, wire.contraction) * short + ONE
+    good = np.minimum(length, left) > ZERO
+    good &= np.isfinite(temperature)
     if not every(good):
         if strict:
             within("temperature", temperature)
