@@ -143,7 +143,7 @@ class SmoothBody:
         self.stiffness.flat[self._where] = model.jnt_stiffness[self._joint]
 
     def _moves(self) -> NDArray[np.bool_]:
-        """Which motions the cells can have, shape (4, cells): several hinges turn about any axis."""
+        """Motions that the cells can have, shape (4, cells): several hinges turn about any axis."""
         moves = np.zeros(self._shape, np.bool_)
         moves.flat[self._where] = True
         if not self._planar:

@@ -15,7 +15,6 @@ from tca_mj.smp.material import SmpSpec, SpineSpec
 from tca_mj.tca.arrays import column
 from tca_mj.tca.thermal import BareStep
 
-
 _KEPT = 16  # of what a step does with some of the fans on, how many are kept at once
 
 

@@ -9,13 +9,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from tca_mj.checks import Array, door, every, floats
-from tca_mj.tca.arrays import column
+from tca_mj.tca.arrays import FEW, column
 from tca_mj.tca.laws.rod import CoilRods
 from tca_mj.tca.laws.table import calibrate, evaluate, evaluate_one
 from tca_mj.tca.moduli import softened_one
 from tca_mj.tca.spec import TcaSpec
-
-_FEW = 4  # TCAs that Python reads one by one faster than NumPy all at once
 
 
 class CoilSurfaces:
@@ -71,7 +69,7 @@ class CoilSurfaces:
         self._table = np.ascontiguousarray(np.concatenate(columns, axis=1))
         self._offset = np.array([offset[id(surface)] for surface in self.surfaces])
         self._row = q + 1.0
-        self._each = self._numbers() if self.n <= _FEW and not self.rods.any_hot else []
+        self._each = self._numbers() if self.n <= FEW and not self.rods.any_hot else []
         self._cells = np.ascontiguousarray(self._table.T) if self._each else self._table.T
 
     def _numbers(self) -> list[tuple[float, ...]]:
