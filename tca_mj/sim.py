@@ -66,8 +66,9 @@ from tca_mj.tca import (
 # the former, and takes some ten microseconds for each of a small robot.
 MOST_SUBSTEPS, MOST_STEPS = 10_000, 1_000_000
 # Physics steps after which is looked whether the state has diverged: one that is no number takes
-# the solver all its iterations, of a robot with many contacts half a second for each step.
-_RUN = 5
+# the solver all its iterations, of a robot with many contacts half a second for each step. Of one
+# with few degrees of freedom, whose steps cost less, there are more: so many over their number.
+_RUN, _RUN_BY_FREEDOM = 5, 640
 _NO_WARNING = bytes(4 * int(mujoco.mjtWarning.mjNWARNING))  # how many there were of each kind
 _SLIDE = int(mujoco.mjtJoint.mjJNT_SLIDE)
 _SNAPPING = int(mujoco.mjtIntegrator.mjINT_IMPLICITFAST)
@@ -167,6 +168,7 @@ class Simulation:
         self.bank = bank_of([tca.spec for tca in part.tcas], law, ambient, creep, cycles)
         self.bank.supply = supply or Supply()
         self.substeps = substeps
+        self._run = max(_RUN, _RUN_BY_FREEDOM // max(self.model.nv, 1))
         self._lasting = math.nan, 0  # a duration, and how many updates it takes
         self.gain = 1.0
 
@@ -512,8 +514,8 @@ class Simulation:
                 f"the TCAs have no state at {self.time:.3f} s: {error}"
             ) from error
         self._hand_over(pull)
-        for done in range(0, substeps, _RUN):
-            mujoco.mj_step(model, data, min(_RUN, substeps - done))
+        for done in range(0, substeps, self._run):
+            mujoco.mj_step(model, data, min(self._run, substeps - done))
             if data.warning.number.tobytes() != _NO_WARNING:
                 self._check()
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tca_mj.checks import Array, flags, within
+from tca_mj.checks import Array, flags, some, within
 from tca_mj.model.smooth import SmoothBody
 from tca_mj.model.spine import RoutedSpine
 from tca_mj.model.sums import Total, rows
@@ -175,7 +175,8 @@ class Spines:
             modulus.take(self._joint, axis=-1), tension.take(self._tca, axis=-1),
             self._rate * tension_rate.take(self._tca, axis=-1), self._damage,
         )  # fmt: skip
-        self.damaged = self.damaged | np.logical_or.reduceat(harmed, self._pair, axis=-1)
+        if some(harmed):
+            self.damaged = self.damaged | np.logical_or.reduceat(harmed, self._pair, axis=-1)
 
     def _stiffen(self, state: SpinesState) -> Array:
         """Sets the springs of the cells; returns the modulus of the spine at each joint [Pa]."""

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from tca_mj.checks import Array
 
 Value = TypeVar("Value")
+_ONE = (1,)
 
 
 def frozen(values: ArrayLike) -> Array:
@@ -24,6 +25,19 @@ ZERO, ONE = frozen(0.0), frozen(1.0)
 """Numbers for what runs often: NumPy takes half as long for one in an array as for Python's."""
 
 FEW = 4  # TCAs that Python computes one by one, to the bit, faster than NumPy all at once
+
+
+def alone(*values: Any) -> list[float] | None:
+    """The numbers of arrays of one number each, shape (1,); None if one is something else.
+
+    Arithmetic is as exact with Python's numbers, and takes a tenth of the time.
+    """
+    numbers = []
+    for value in values:
+        if type(value) is not np.ndarray or value.shape != _ONE:
+            return None
+        numbers.append(value.item())
+    return numbers
 
 
 def column(objects: Iterable[Any], name: str) -> Array:
