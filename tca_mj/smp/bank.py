@@ -118,12 +118,12 @@ class SpineBank:
         if self._heating is None or self._heating[0] is not heater:
             self._heating = heater, {}
         steps = self._heating[1]
-        if of not in steps:
+        step = steps.get(of)
+        if step is None:
             if len(steps) == _KEPT:
                 steps.clear()
-            steps[of] = BareStep.of(heater, heater.losing(fan), dt)
-        power = voltage * voltage / heater.resistance
-        heat = heated(steps[of], state.heat, power, dt)
+            step = steps[of] = BareStep.of(heater, heater.losing(fan), dt)
+        heat = heated(step, state.heat, voltage * voltage / heater.resistance, dt)
         glass = self.smp.glass(heat.temperature).take(self.owner, axis=-1)
         return SpinesState(heat, with_glass(state.memory, angle, glass))
 

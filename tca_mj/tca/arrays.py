@@ -28,16 +28,17 @@ FEW = 4  # TCAs that Python computes one by one, to the bit, faster than NumPy a
 
 
 def alone(*values: Any) -> list[float] | None:
-    """The numbers of arrays of one number each, shape (1,); None if one is something else.
+    """The numbers of arrays of one each, the first of shape (1,); None if they are not.
 
     Arithmetic is as exact with Python's numbers, and takes a tenth of the time.
     """
-    numbers = []
-    for value in values:
-        if type(value) is not np.ndarray or value.shape != _ONE:
-            return None
-        numbers.append(value.item())
-    return numbers
+    first = values[0]
+    if type(first) is not np.ndarray or first.shape != _ONE:
+        return None
+    try:
+        return [value.item() for value in values]
+    except (AttributeError, ValueError):  # a number of Python's, or several in one array
+        return None
 
 
 def column(objects: Iterable[Any], name: str) -> Array:
