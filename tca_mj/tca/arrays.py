@@ -24,7 +24,7 @@ def frozen(values: ArrayLike) -> Array:
 ZERO, ONE = frozen(0.0), frozen(1.0)
 """Numbers for what runs often: NumPy takes half as long for one in an array as for Python's."""
 
-FEW = 4  # TCAs that Python computes one by one, to the bit, faster than NumPy all at once
+FEW = 5  # TCAs that Python computes one by one, to the bit, faster than NumPy all at once
 
 
 def alone(*values: Any) -> list[float] | None:
