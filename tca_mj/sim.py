@@ -46,6 +46,7 @@ from tca_mj.drive import (
     Drive as Drive,
 )
 from tca_mj.model.build import stage
+from tca_mj.model.moved import spare_joints
 from tca_mj.model.mujoco_warnings import count_warnings
 from tca_mj.model.part import Part
 from tca_mj.model.smooth import SmoothBody
@@ -156,6 +157,7 @@ class Simulation:
         except ValueError as error:
             name = part.spec.modelname
             raise ValueError(f"part must compile, got {name!r}: {error}") from error
+        spare_joints(self.model)
         self.data = mujoco.MjData(self.model)
         self.tca_period = tca_period
         self.chains = part.members
