@@ -118,7 +118,7 @@ def spring(smp: SmpSpec, state: SpineState) -> Spring:
     """
     instance("smp", smp, SmpSpec)
     instance("state", state, SpineState)
-    modulus = state.glass + smp.rubber
+    modulus = state.glass + smp.rubbery
     share = state.glass / modulus
     return Spring(modulus, state.memory + share * (state.frozen - state.memory))
 

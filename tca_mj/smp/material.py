@@ -71,15 +71,10 @@ class SmpSpec(Checked):
         return (self.middle - self.rigid_below) / math.log((1.0 - lost) / lost)
 
     @cached_property
-    def rubber(self) -> Array:
-        """``rubbery`` as an array, for what runs often [Pa]."""
-        return frozen(self.rubbery)
-
-    @cached_property
-    def _sigmoid(self) -> tuple[Array, Array, Array]:
-        """Its middle, scale and height ln(glassy/rubbery)."""
+    def _sigmoid(self) -> tuple[Array, Array, Array, Array]:
+        """Its middle, scale and height ln(glassy/rubbery), and what it is a factor on."""
         height = math.log(self.glassy / self.rubbery)
-        return frozen(self.middle), frozen(-self.width), frozen(height)
+        return frozen(self.middle), frozen(-self.width), frozen(height), frozen(self.rubbery)
 
     def modulus(self, temperature: ArrayLike) -> Array:
         """Young's modulus E(T), any shape [Pa].
@@ -95,7 +90,7 @@ class SmpSpec(Checked):
         Raises:
             ValueError: If a temperature is not finite.
         """
-        return np.expm1(self._decades(temperature)[0]) * self.rubber
+        return np.expm1(self._decades(temperature)[0]) * self._sigmoid[3]
 
     def slope(self, temperature: ArrayLike) -> Array:
         """dE/dT, never above 0 [Pa/K].
@@ -109,7 +104,7 @@ class SmpSpec(Checked):
     def _decades(self, temperature: ArrayLike) -> tuple[Array, Array]:
         """ln(E/rubbery) and the sigmoid, 1 when cold and 0 when hot."""
         temperature = within("temperature", temperature)
-        middle, width, height = self._sigmoid
+        middle, width, height, _ = self._sigmoid
         share = expit((temperature - middle) / width)
         return share * height, share
 

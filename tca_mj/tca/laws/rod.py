@@ -271,13 +271,6 @@ class CoilRods:
         growth = self._growth(temperature)
         return self._torsion_per_tension / (growth * growth * growth)
 
-    @property
-    def softening(self) -> tuple[Array, ...]:
-        """What ``softened_one`` needs behind the tension, where ``any_hot`` is False."""
-        fibre = self._fibres
-        rate = fibre.softening_rate
-        return self._torsion_per_tension, fibre.reference_temperature, rate, *fibre.load_softening
-
     def _growth(self, temperature: Array) -> Array | float:
         """Radius of the section over its radius when cold; 1 for a cold section."""
         if not self.any_hot:

@@ -12,7 +12,7 @@ from tca_mj.checks import Array, door, every, floats
 from tca_mj.tca.arrays import FEW, column
 from tca_mj.tca.laws.rod import CoilRods
 from tca_mj.tca.laws.table import calibrate, evaluate, evaluate_one
-from tca_mj.tca.moduli import softened_one
+from tca_mj.tca.moduli import FibreTable, softened_one
 from tca_mj.tca.spec import TcaSpec
 
 
@@ -69,16 +69,17 @@ class CoilSurfaces:
         self._table = np.ascontiguousarray(np.concatenate(columns, axis=1))
         self._offset = np.array([offset[id(surface)] for surface in self.surfaces])
         self._row = q + 1.0
-        self._each = self._numbers() if self.n <= FEW and not self.rods.any_hot else []
+        self._each = self._numbers(specs) if self.n <= FEW and not self.rods.any_hot else []
         self._cells = np.ascontiguousarray(self._table.T) if self._each else self._table.T
 
-    def _numbers(self) -> list[tuple[float, ...]]:
+    def _numbers(self, specs: Sequence[TcaSpec]) -> list[tuple[float, ...]]:
         """What ``_one_by_one`` needs of each TCA."""
-        rods, n = self.rods, self.n
+        rods, n, fibres = self.rods, self.n, FibreTable.of([spec.fibre for spec in specs])
         bounds = (np.maximum(self.shortest, rods.minimum), self.longest, self.coldest, self.hottest)
         cells = (self._start[:n], self._per_metre, self._start[n:], self._per_unit[n:])
         cells += (self._row, self._offset)
-        columns = (*bounds, *cells, *rods.softening)
+        fibre = rods.torsion_per_tension(self.coldest), fibres.reference_temperature
+        columns = (*bounds, *cells, *fibre, fibres.softening_rate, *fibres.load_softening)
         return list(zip(*(column.tolist() for column in columns), strict=True))
 
     def tension(self, length: ArrayLike, temperature: ArrayLike) -> tuple[Array, Array]:
