@@ -76,10 +76,10 @@ class CoilSurfaces:
         """What ``_one_by_one`` needs of each TCA."""
         rods, n, fibres = self.rods, self.n, FibreTable.of([spec.fibre for spec in specs])
         bounds = (np.maximum(self.shortest, rods.minimum), self.longest, self.coldest, self.hottest)
-        cells = (self._start[:n], self._per_metre, self._start[n:], self._per_unit[n:])
-        cells += (self._row, self._offset)
-        fibre = rods.torsion_per_tension(self.coldest), fibres.reference_temperature
-        columns = (*bounds, *cells, *fibre, fibres.softening_rate, *fibres.load_softening)
+        cells = self._start[:n], self._per_metre, self._start[n:], self._per_unit[n:]
+        twist, rate = rods.torsion_per_tension(self.coldest), fibres.softening_rate
+        fibre = twist, fibres.reference_temperature, rate, *fibres.load_softening
+        columns = *bounds, *cells, self._row, self._offset, *fibre
         return list(zip(*(column.tolist() for column in columns), strict=True))
 
     def tension(self, length: ArrayLike, temperature: ArrayLike) -> tuple[Array, Array]:
