@@ -422,8 +422,8 @@ class SimulatedTask(gym.Env[Observation, Action], ABC):
     @property
     def energy(self) -> float:
         """Electrical energy put into TCAs and heaters since the reset [J]."""
-        energy, spines = np.add.reduce(self.sim.energy), self.sim.spines
-        return float(energy + np.add.reduce(spines.energy) if spines.n else energy)
+        energy, spines = _sum(self.sim.energy), self.sim.spines
+        return energy + _sum(spines.energy) if spines.n else energy
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -671,6 +671,10 @@ def parts(name: str, time: float, part: float, *, of: int = 1) -> int:
         number = f"multiple of {of}" if of > 1 else "whole number"
         raise ValueError(f"{name} must be {time} s over a {number}, got {part}")
     return count
+
+
+def _sum(values: NDArray[np.float64]) -> float:
+    return values.item() if values.size == 1 else float(np.add.reduce(values))
 
 
 def _times(part: float, time: float) -> int:

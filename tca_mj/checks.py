@@ -38,6 +38,8 @@ LARGEST, SMALLEST = 1e30, 1e-30
 P = ParamSpec("P")
 R = TypeVar("R")
 
+_DOUBLE = np.dtype(np.float64)
+_FEW = 8  # numbers that Python compares faster than NumPy
 _SHORT = reprlib.Repr()
 _SHORT.maxother, _SHORT.maxstring, _SHORT.maxlist, _SHORT.maxtuple = 160, 80, 8, 8
 
@@ -62,8 +64,10 @@ def floats(name: str, values: ArrayLike, *, empty: bool = False) -> Array:
         ValueError: If they are complex, text, dates, masked, true or false, ragged or no numbers at
             all, which NumPy would partly convert with a warning or none.
     """
-    if type(values) is np.ndarray and values.dtype == np.float64:
-        return values
+    if type(values) is np.ndarray:
+        kind = values.dtype
+        if kind is _DOUBLE or kind == _DOUBLE:
+            return values
     if type(values) is float:
         return np.array(values)
     try:
@@ -121,8 +125,10 @@ def within(
         kind = f"finite numbers of shape {shape}" if shape else "one finite number"
         raise ValueError(f"{name} must be {kind}, got {shown(values)}")
     least, most = max(at_least, -LARGEST), min(at_most, LARGEST)
-    if array.size == 1:
-        good = above < (one := array.item()) >= least and below > one <= most
+    if array.size <= _FEW:
+        good = True
+        for one in array.ravel().tolist():
+            good &= above < one >= least and below > one <= most
     else:
         low = array > above if above >= least else array >= least
         good = every(low) and every(array < below if below <= most else array <= most)

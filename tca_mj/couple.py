@@ -23,11 +23,12 @@ from numpy.typing import NDArray
 from tca_mj.model.smooth import SmoothBody, Strained
 from tca_mj.model.spines import Spines
 from tca_mj.tca import Pull, TcaBank, TcaState
+from tca_mj.tca.arrays import ZERO, frozen
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
-_TAUT = 1e-10  # tension added to each TCA's law, so that at rest it is taut [N]
+_TAUT = frozen(1e-10)  # tension added to each TCA's law, so that at rest it is taut [N]
 
 
 class Inputs(NamedTuple):
@@ -88,6 +89,7 @@ def advance(
     Raises:
         ValueError, TcaMelted, CoilSolveError: As ``TcaBank.advance``.
     """
+    gain = np.asarray(gain)
     if not spines.n:
         later, pull = bank.advance(tca, inputs.command, length, period)
         return later, Pull(pull.tension * gain, pull.stiffness * gain, length)
@@ -119,7 +121,7 @@ def write(
         tendon_slope: Their derivatives, ``ten_J``, shape (..., nJten).
         steadiness: Time over which the damping of taut tendons is made [s].
     """
-    tension = np.maximum(pull.tension, 0.0)
+    tension = np.maximum(pull.tension, ZERO)
     stiffness, reference = body.springs(strained, tension, tendon_slope, qpos)
     constant = pull.stiffness * tendon_length - (pull.tension + _TAUT)
     force = np.concatenate((constant, -pull.stiffness), axis=-1)

@@ -46,6 +46,7 @@ from tca_mj.drive import (
     Drive as Drive,
 )
 from tca_mj.model.build import stage
+from tca_mj.model.moved import spare_joints
 from tca_mj.model.mujoco_warnings import count_warnings
 from tca_mj.model.part import Part
 from tca_mj.model.smooth import SmoothBody
@@ -66,8 +67,10 @@ from tca_mj.tca import (
 # the former, and takes some ten microseconds for each of a small robot.
 MOST_SUBSTEPS, MOST_STEPS = 10_000, 1_000_000
 # Physics steps after which is looked whether the state has diverged: one that is no number takes
-# the solver all its iterations, of a robot with many contacts half a second for each step.
-_RUN = 5
+# the solver all its iterations, of a robot with many contacts half a second for each step. Of one
+# with few degrees of freedom, whose steps cost less, there are more: so many over their number.
+_RUN, _RUN_BY_FREEDOM = 5, 640
+_NO_WARNING = bytes(4 * int(mujoco.mjtWarning.mjNWARNING))  # how many there were of each kind
 _SLIDE = int(mujoco.mjtJoint.mjJNT_SLIDE)
 _SNAPPING = int(mujoco.mjtIntegrator.mjINT_IMPLICITFAST)
 
@@ -154,6 +157,7 @@ class Simulation:
         except ValueError as error:
             name = part.spec.modelname
             raise ValueError(f"part must compile, got {name!r}: {error}") from error
+        spare_joints(self.model)
         self.data = mujoco.MjData(self.model)
         self.tca_period = tca_period
         self.chains = part.members
@@ -166,6 +170,7 @@ class Simulation:
         self.bank = bank_of([tca.spec for tca in part.tcas], law, ambient, creep, cycles)
         self.bank.supply = supply or Supply()
         self.substeps = substeps
+        self._run = max(_RUN, _RUN_BY_FREEDOM // max(self.model.nv, 1))
         self._lasting = math.nan, 0  # a duration, and how many updates it takes
         self.gain = 1.0
 
@@ -513,9 +518,9 @@ class Simulation:
                 f"the TCAs have no state at {self.time:.3f} s: {error}"
             ) from error
         self._hand_over(pull)
-        for done in range(0, substeps, _RUN):
-            mujoco.mj_step(model, data, min(_RUN, substeps - done))
-            if data.warning.number.any():
+        for done in range(0, substeps, self._run):
+            mujoco.mj_step(model, data, min(self._run, substeps - done))
+            if data.warning.number.tobytes() != _NO_WARNING:
                 self._check()
 
     def checked(self, command: ArrayLike, voltage: ArrayLike, fan: ArrayLike) -> Inputs:

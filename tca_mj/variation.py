@@ -129,6 +129,7 @@ class Nominal:
         }
         self.heat = sim.bank.heat
         self._heater = sim.spines.bank.heater if sim.spines.n else None
+        self._last: Any = None, None  # heat loss and ambient of before, and what they made
         self._gain = sim.gain
         self.variation = Variation()
 
@@ -148,14 +149,18 @@ class Nominal:
             for name in names:
                 getattr(model, name)[:] = factor * self._figures[name]
         sim.gain = self._gain * variation.tca_gain
-        loss, ambient = variation.heat_loss, variation.ambient
-        sim.bank.heat = _varied(
-            self.heat, loss, ambient,
-            conductance=loss * self.heat.conductance, body_loss=loss * self.heat.body_loss,
-        )  # fmt: skip
-        if self._heater is not None:
-            sim.spines.bank.heater = _varied(self._heater, loss, ambient)
+        sim.bank.heat, heater = self._heats(variation.heat_loss, variation.ambient)
+        if heater is not None:
+            sim.spines.bank.heater = heater
         self.variation = variation
+
+    def _heats(self, loss: float, ambient: float) -> tuple[HeatSpec, HeaterSpec | None]:
+        """Constants of TCAs and spines; what a bank has computed from the last ones holds on."""
+        if (loss, ambient) != self._last[0]:
+            more = {name: loss * getattr(self.heat, name) for name in ("conductance", "body_loss")}
+            heater = None if self._heater is None else _varied(self._heater, loss, ambient)
+            self._last = (loss, ambient), (_varied(self.heat, loss, ambient, **more), heater)
+        return self._last[1]
 
 
 def _varied(heat: Heat, factor: float, ambient: float, **more: Any) -> Heat:

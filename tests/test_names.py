@@ -32,8 +32,8 @@ INTERNAL = {
     "tca_mj.tca": {
         "arrays": "*", "laws.castigliano": "*", "laws.coil": "*", "laws.love": "*",
         "laws.model": "*", "laws.plies": "*", "laws.rod": "Point require_domain sheared",
-        "laws.roots": "bracketed closed", "laws.table": "coil_alone evaluate solved",
-        "materials": "Named", "moduli": "softened", "spec": "heat_of",
+        "laws.roots": "bracketed closed", "laws.table": "coil_alone evaluate evaluate_one solved",
+        "materials": "Named", "moduli": "softened softened_one", "spec": "heat_of",
         "thermal": "BareStep require_bare",
     },
     "tca_mj.tca.identify": {
@@ -49,8 +49,8 @@ INTERNAL = {
         "sections": "*", "shooting": "*", "solving": "*",
     },
     "tca_mj.model": {
-        "chain": "hinge_angles", "curves": "*", "smooth": "*", "spines": "*", "sums": "*",
-        "surface": "*",
+        "chain": "hinge_angles", "curves": "*", "moved": "*", "smooth": "*", "spines": "*",
+        "sums": "*", "surface": "*",
     },
     "tca_mj.robots": {
         "lift": "add_bridge add_lift", "morphing_grid": "Beam",

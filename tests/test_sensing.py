@@ -15,6 +15,7 @@ from tca_mj.tca import (
     resistance,
     sensed_length,
 )
+from tca_mj.tca.arrays import FEW
 from tca_mj.tca.sensing.sensor import (
     CurrentSensor,
     measured,
@@ -271,3 +272,21 @@ def test_bad_inputs_are_refused():
     for values in (1.0, [math.nan]):
         with pytest.raises(ValueError, match="values"):
             moving_average(values, 2)
+
+
+@pytest.mark.parametrize("n", [1, FEW, FEW + 1])
+def test_resistances_of_few_are_to_the_bit_those_of_many(n):
+    """Also where there is none: it is no number then, or refused."""
+    specs = (list(CATALOGUE.values()) * 2)[:n]
+    wire, rng = WireTable.of(specs), np.random.default_rng(n)
+    length = wire.rest_length * rng.uniform(0.4, 2.5, (200, n))
+    length[::10, 0], length[5, -1], length[7, 0] = -0.01, math.inf, math.nan
+    warm = rng.uniform(0.0, 180.0, (200, n))
+    every = resistance(wire, length, warm, strict=False)
+    each = np.array([
+        resistance(wire, *pair, strict=False) for pair in zip(length, warm, strict=True)
+    ])  # fmt: skip
+    assert each.tobytes() == every.tobytes() and np.isnan(each[::10, 0]).all()
+    for bad in (-0.01, math.inf, math.nan):
+        with pytest.raises(ValueError, match="must be"):
+            resistance(wire, np.full(n, bad), warm[0])

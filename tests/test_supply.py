@@ -205,3 +205,14 @@ def test_supplies_are_alike_number_by_number():
     assert not made(0.1).like(made(0.1 + 1e-15))
     assert Supply().like(Supply()) and not Supply().like(Supply(max_power=1.0))
     assert not Supply().like(Supply(quantity="voltage"))
+
+
+def test_a_thermostat_of_one_tca_is_to_the_bit_one_of_many():
+    """Below and above its limits; what is no number stays none."""
+    heat, rng = heat_of([SPECS[0]]), np.random.default_rng(0)
+    thermostat = Thermostat(heat=heat, max_power=np.array([4.0]))
+    now, body = rng.uniform(0.0, 190.0, (2, 200, 1))
+    target = rng.uniform(0.0, 250.0, (200, 1))
+    now[3] = math.nan
+    each = [thermostat._power(*one) for one in zip(now, target, body, strict=True)]
+    assert np.array(each).tobytes() == thermostat._power(now, target, body).tobytes()

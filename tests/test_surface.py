@@ -17,6 +17,7 @@ from tca_mj.tca import (
     TcaState,
     calibrate,
 )
+from tca_mj.tca.arrays import FEW
 
 FREE_STROKE = CATALOGUE["free-stroke"]
 THREAD = MATERIALS["silver-coated nylon sewing thread"].measured
@@ -266,3 +267,16 @@ def test_the_banks_two_laws_agree():
     np.testing.assert_allclose(read.stiffness, exact.stiffness, rtol=2e-4)
     with pytest.raises(ValueError, match="law"):
         TcaBank(SPECS, law="table")
+
+
+@pytest.mark.parametrize("n", range(1, FEW + 2))
+def test_few_tcas_read_one_by_one_are_to_the_bit_what_many_read_at_once(n):
+    """Also where coils touch, where they are colder or hotter than the table, and one too many."""
+    specs = (list(CATALOGUE.values()) * 2)[:n]
+    law, rng = CoilSurfaces(specs), np.random.default_rng(n)
+    least, most = law.rods.shortest, law.rods.longest
+    length = least + (most - least) * rng.uniform(0.001, 0.999, (400, n))
+    temperature = rng.uniform(-40.0, 230.0, (400, n)) if n % 2 else rng.uniform(0, 180, (400, n))
+    every = law.tension(length, temperature)
+    each = np.array([law.tension(*pair) for pair in zip(length, temperature, strict=True)])
+    assert np.array(every).tobytes() == np.ascontiguousarray(each.transpose(1, 0, 2)).tobytes()

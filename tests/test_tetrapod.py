@@ -331,6 +331,41 @@ def test_the_finer_model_is_the_same_robot(shape, still):
     )
 
 
+# What of the robot its tendons move.
+
+
+@pytest.mark.parametrize("build", [tetrapod, rigid_tetrapod])
+def test_rows_of_tendons_are_without_the_joints_that_carry_them(build, monkeypatch):
+    """A second of heated legs goes to 1e-9 where it goes with all joints in the rows."""
+
+    def heated():
+        part = build()
+        part.spec.option.jacobian = mujoco.mjtJacobian.mjJAC_SPARSE  # as tasks have it
+        sim = floating(part)
+        power = np.zeros(sim.n)
+        power[:12] = np.random.default_rng(0).uniform(0.0, 3.0, 12)
+        sim.step(power, 1.0)
+        return sim
+
+    spared = heated()
+    with monkeypatch.context() as patch:
+        patch.setattr("tca_mj.sim.spare_joints", lambda model: None)
+        whole = heated()
+    model, nodes = spared.model, SPEC.leg.nodes
+    for name, tendon in zip(spared.tca_names, spared.tendon, strict=True):
+        first, count = model.ten_J_rowadr[tendon], model.ten_J_rownnz[tendon]
+        moved = model.dof_jntid[model.ten_J_colind[first : first + count]]
+        joints = [model.joint(int(joint)).name for joint in moved]
+        assert "root" not in joints
+        if not name.startswith("spine"):
+            leg = name.split(".")[0]
+            assert count == 3 * nodes and all(each.startswith(f"{leg}.rod.") for each in joints)
+    assert whole.model.ten_J_rownnz.sum() > 1.5 * model.ten_J_rownnz.sum()
+    assert np.abs(spared.data.qpos - whole.data.qpos).max() < 1e-9
+    assert np.abs(whole.data.qvel).max() > 1e-3
+    assert spared.tension == pytest.approx(whole.tension, abs=1e-9)
+
+
 # The body when it is cold.
 
 

@@ -187,3 +187,14 @@ def test_laws_of_a_bare_tca_refuse_a_body():
             replace(heat, **{name: -1.0})
     with pytest.raises(ValueError, match="body_capacity"):
         replace(heat, body_capacity=0.0)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_one_tca_alone_is_to_the_bit_one_of_many(seed):
+    """Its step is computed with Python's numbers."""
+    heat, rng = constants(seed, n=1), np.random.default_rng(seed)
+    step = HeatStep.of(heat, 0.1)
+    temperature, body, power = rng.uniform(0.0, 200.0, (3, 100, 1))
+    every = step.advance(temperature, body, power)
+    each = [step.advance(*now) for now in zip(temperature, body, power, strict=True)]
+    assert np.array(each).transpose(1, 0, 2).tobytes() == np.array(every).tobytes()

@@ -79,8 +79,9 @@ def benchmark(
             bar.update()
     with _if_installed("training", result):
         result["training"] = _training(trained, max(int(1024 * scale), 64), min(n, 8))
-    held = (id for id in chosen if any(recipe.scaled for recipe in recipes(id).values()))
-    by_recipe = next(held, None)
+    held = [id for id in chosen if any(recipe.scaled for recipe in recipes(id).values())]
+    coarser = [id for id in held if any(recipe.timestep for recipe in recipes(id).values())]
+    by_recipe = next(iter(coarser + held), None)
     if by_recipe is not None:
         with _if_installed("by_recipe", result):
             result["by_recipe"] = _by_recipe(by_recipe, max(int(800 * scale), 64))
@@ -260,9 +261,10 @@ def _by_recipe(id: str, decisions: int) -> dict[str, tuple[float, float]]:
     assert isinstance(config.learner, OffPolicy)  # they alone have mirrored memories
     config = replace(config, learner=replace(config.learner, learning_starts=config.envs))
     peer: Any = gym.make(_PEER).unwrapped
+    own = {} if config.timestep is None else {"timestep": config.timestep}
     tasks = TaskVecEnv.make(
-        id, config.envs, scaled=True, num_threads=1, timestep=config.timestep,
-        reset_options=dict(config.options), **config.arguments,
+        id, config.envs, scaled=True, num_threads=1, reset_options=dict(config.options),
+        **config.arguments, **own,
     )  # fmt: skip
     peers = DummyVecEnv([lambda: gym.make(_PEER)] * config.envs)
     ways: list[tuple[str, Any, VecEnv, float]] = [

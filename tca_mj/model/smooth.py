@@ -87,11 +87,15 @@ class SmoothBody:
         self._tca = np.array([i for i, tca in enumerate(tcas) for _ in tca.crossings], np.int64)
         self._cell = np.array([number[tuple(c.joints.values())] for c in crossings], np.int64)
         self._read_cells(list(cells.values()))
-        self._curves = Curves(crossings, self._cell, self._shape[1])
+        self._curves = Curves(crossings, self._cell, self._moves())
         self._lengths, self._twists = Total(self._tca, len(tcas)), Total(self._cell, self._shape[1])
+        # What tensions do by the slopes of crossings: to each joint, or to each motion of a cell.
         motions = rows(0, 1, 2, 3, width=self._shape[1], columns=self._cell)
-        self._pulling = np.tile(self._tca, 4)
-        self._pulls = Total(motions, 4 * self._shape[1])
+        slope = np.flatnonzero(self._moves().ravel()[motions])
+        place, size = motions[slope], 4 * self._shape[1]
+        if self._planar:
+            place, size = np.searchsorted(self._where, place), self._where.size
+        self._pulls = Form(place, 1.0, np.tile(self._tca, 4)[slope], slope, size=size)
         self._read_tendons([model.tendon(tca.name).id for tca in tcas])
         self._read_polylines(crossings)
         self.rest = self.at(model.qpos_spring).motion.copy()
@@ -137,6 +141,14 @@ class SmoothBody:
         self._qpos, self._dof = model.jnt_qposadr[self._joint], model.jnt_dofadr[self._joint]
         self.damping.flat[self._where] = model.dof_damping[self._dof]
         self.stiffness.flat[self._where] = model.jnt_stiffness[self._joint]
+
+    def _moves(self) -> NDArray[np.bool_]:
+        """Motions that the cells can have, shape (4, cells): several hinges turn about any axis."""
+        moves = np.zeros(self._shape, np.bool_)
+        moves.flat[self._where] = True
+        if not self._planar:
+            moves[1:] = True
+        return moves
 
     def _read_turns(self, order: Array, row: Callable[..., Places]) -> None:
         """The products that rotations of cells are made of.
@@ -252,15 +264,19 @@ class SmoothBody:
             qpos: Positions of the model's joints, shape (..., nq).
         """
         flat = (*tension.shape[:-1], -1)
-        load = (self.stiffness * (strained.motion - self.rest)).reshape(flat)
-        load += self._pulls.of(tension.take(self._pulling, axis=-1) * strained.slope.reshape(flat))
-        if not self._planar:
+        position = qpos.take(self._qpos, axis=-1)
+        own = self.stiffness.reshape(flat).take(self._where, axis=-1)
+        load = self._pulls.of(tension, strained.slope.reshape(flat))
+        if self._planar:  # each motion is that of a joint
+            load += own * (position - self.rest.reshape(flat).take(self._where, axis=-1))
+        else:
+            load += (self.stiffness * (strained.motion - self.rest)).reshape(flat)
             self._turn_to_hinges(load, strained)
-        owed = load.take(self._where, axis=-1) - self._entries.of(tension, slope)
-        stiffness = self.stiffness.reshape(flat).take(self._where, axis=-1)
-        stiffness += self._more.of(tension)
+            load = load.take(self._where, axis=-1)
+        owed = load - self._entries.of(tension, slope)
+        stiffness = own + self._more.of(tension)
         owed /= stiffness
-        return stiffness, qpos.take(self._qpos, axis=-1) - owed
+        return stiffness, position - owed
 
     def support(self, data: mujoco.MjData, strained: Strained, tension: Array) -> None:
         """Sets the springs for tensions at the positions in ``data``.

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tca_mj.checks import Array, flags, within
+from tca_mj.checks import LARGEST, Array, flags, some, within
 from tca_mj.model.smooth import SmoothBody
 from tca_mj.model.spine import RoutedSpine
 from tca_mj.model.sums import Total, rows
@@ -44,7 +44,7 @@ class Spines:
         self.names = tuple(spine.name for spine in spines)
         self.damaged = np.zeros(self.n, dtype=bool)
         self.voltage = self._off = np.zeros(self.n)
-        self._still = self.damaged
+        self._still, self._blown = self.damaged, np.ones(self.n, dtype=bool)
         self.state: SpinesState | None = None
         self._sprung: Any = (None, None)  # state for which springs were computed last, and these
         if not self.n:
@@ -140,8 +140,11 @@ class Spines:
         Raises:
             ValueError: If one has the wrong shape or is not finite, or there are no spines.
         """
-        if type(voltage) is float and voltage == 0.0 and fan is False:  # as without any spine
-            return self._off, self._still
+        if type(voltage) is float and type(fan) is bool:
+            if voltage == 0.0 and not fan:  # as without any spine
+                return self._off, self._still
+            if self.n and abs(voltage) <= LARGEST:
+                return self._off + voltage, self._blown if fan else self._still
         volts, blown, shape = within("voltage", voltage), flags("fan", fan), (self.n,)
         for name, array in (("voltage", volts), ("fan", blown)):
             if array.shape not in ((), shape):
@@ -171,11 +174,14 @@ class Spines:
         self.voltage = voltage
         state = self.state = self.bank.advance(self.state, voltage, fan, self._angles(motion), dt)
         modulus = self._stiffen(state)
+        if not some(tension > self._damage.slack):
+            return
         harmed = damaging(
             modulus.take(self._joint, axis=-1), tension.take(self._tca, axis=-1),
             self._rate * tension_rate.take(self._tca, axis=-1), self._damage,
         )  # fmt: skip
-        self.damaged = self.damaged | np.logical_or.reduceat(harmed, self._pair, axis=-1)
+        if some(harmed):
+            self.damaged = self.damaged | np.logical_or.reduceat(harmed, self._pair, axis=-1)
 
     def _stiffen(self, state: SpinesState) -> Array:
         """Sets the springs of the cells; returns the modulus of the spine at each joint [Pa]."""

@@ -33,16 +33,16 @@ class Total:
     """
 
     def __init__(self, place: Places, size: int) -> None:
-        self.place, self.size = place, size
+        self.place, self.size, self._some = place, size, place.size > 0
         self._many, self._places = 1, place  # of several arrays one behind the other
 
     def of(self, values: Array) -> Array:
         """Shape (..., k) to (..., size)."""
-        lead = values.shape[:-1]
-        if not self.place.size:
-            return np.zeros((*lead, self.size))
-        if not lead:
+        if values.ndim == 1 and self._some:
             return np.bincount(self.place, values, self.size)  # type: ignore[return-value]
+        lead = values.shape[:-1]
+        if not self._some:
+            return np.zeros((*lead, self.size))
         many = math.prod(lead)
         if many != self._many:
             start = self.size * np.arange(many)[:, None]
@@ -72,9 +72,14 @@ class Form:
 
     def of(self, first: Array, second: Array | None = None) -> Array:
         """The sums, shape (..., size)."""
-        terms = first.take(self._factors[0], axis=-1)
-        if second is not None:
-            terms *= second.take(self._factors[1], axis=-1)
+        if first.ndim == 1:  # an index is found in half the time of take
+            terms = first[self._factors[0]]
+            if second is not None:
+                terms *= second[self._factors[1]]
+        else:
+            terms = first.take(self._factors[0], axis=-1)
+            if second is not None:
+                terms *= second.take(self._factors[1], axis=-1)
         if not self._plain:
             terms *= self._coefficient
         return self._total.of(terms)

@@ -15,6 +15,8 @@ from tca_mj.smp.material import SmpSpec, SpineSpec
 from tca_mj.tca.arrays import column
 from tca_mj.tca.thermal import BareStep
 
+_KEPT = 16  # of what a step does with some of the fans on, how many are kept at once
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SpinesState:
@@ -66,7 +68,7 @@ class SpineBank:
         self.smp: SmpSpec = specs[0].smp
         names = [field.name for field in fields(HeaterSpec)]
         self.heater = HeaterSpec(**{name: column(heaters, name) for name in names})
-        self._heating: tuple[HeaterSpec, tuple[float, bytes], BareStep] | None = None
+        self._heating: tuple[HeaterSpec, dict[tuple[float, bytes], BareStep]] | None = None
 
     @property
     def n(self) -> int:
@@ -113,10 +115,15 @@ class SpineBank:
             ValueError: If a spine gets a temperature that is not finite. Inputs are not checked.
         """
         heater, of = self.heater, (dt, fan.tobytes())
-        if self._heating is None or self._heating[0] is not heater or self._heating[1] != of:
-            self._heating = heater, of, BareStep.of(heater, heater.losing(fan), dt)
-        power = voltage * voltage / heater.resistance
-        heat = heated(self._heating[2], state.heat, power, dt)
+        if self._heating is None or self._heating[0] is not heater:
+            self._heating = heater, {}
+        steps = self._heating[1]
+        step = steps.get(of)
+        if step is None:
+            if len(steps) == _KEPT:
+                steps.clear()
+            step = steps[of] = BareStep.of(heater, heater.losing(fan), dt)
+        heat = heated(step, state.heat, voltage * voltage / heater.resistance, dt)
         glass = self.smp.glass(heat.temperature).take(self.owner, axis=-1)
         return SpinesState(heat, with_glass(state.memory, angle, glass))
 

@@ -31,6 +31,9 @@ from numpy.typing import ArrayLike
 
 from tca_mj.checks import Array, Temperatures, door, instance, within
 from tca_mj.smp.material import SmpSpec
+from tca_mj.tca.arrays import ZERO, frozen
+
+_LEAST = frozen(5e-324)  # the least number that is not 0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -101,8 +104,8 @@ def advance(
 def with_glass(state: SpineState, angle: Array, glass: Array) -> SpineState:
     """``advance`` to a modulus of the glass, which is not below 0. Nothing is checked."""
     # Share of new glass in all of it; without any glass there is nothing to move.
-    share = np.maximum(glass - state.glass, 0.0)
-    share /= np.maximum(glass, 5e-324)
+    share = np.maximum(glass - state.glass, ZERO)
+    share /= np.maximum(glass, _LEAST)
     return SpineState(state.memory, state.frozen + share * (angle - state.frozen), glass)
 
 

@@ -13,6 +13,7 @@ from scipy.special import expit
 
 from tca_mj.checks import Array, Checked, Finite, Positive, door, number, require_positive, within
 from tca_mj.hints import Length, Modulus, Section, modulus
+from tca_mj.tca.arrays import frozen
 
 # Above 110 °C the modulus is below this, Sun, dissertation, Colorado State University, 6.1.3 [Pa].
 SOFT_MODULUS = 50e6
@@ -70,9 +71,10 @@ class SmpSpec(Checked):
         return (self.middle - self.rigid_below) / math.log((1.0 - lost) / lost)
 
     @cached_property
-    def _height(self) -> float:
-        """Of the sigmoid, ln(glassy/rubbery)."""
-        return math.log(self.glassy / self.rubbery)
+    def _sigmoid(self) -> tuple[Array, Array, Array, Array]:
+        """Its middle, scale and height ln(glassy/rubbery), and what it is a factor on."""
+        height = math.log(self.glassy / self.rubbery)
+        return frozen(self.middle), frozen(-self.width), frozen(height), frozen(self.rubbery)
 
     def modulus(self, temperature: ArrayLike) -> Array:
         """Young's modulus E(T), any shape [Pa].
@@ -88,7 +90,7 @@ class SmpSpec(Checked):
         Raises:
             ValueError: If a temperature is not finite.
         """
-        return np.expm1(self._decades(temperature)[0]) * self.rubbery
+        return np.expm1(self._decades(temperature)[0]) * self._sigmoid[3]
 
     def slope(self, temperature: ArrayLike) -> Array:
         """dE/dT, never above 0 [Pa/K].
@@ -102,8 +104,9 @@ class SmpSpec(Checked):
     def _decades(self, temperature: ArrayLike) -> tuple[Array, Array]:
         """ln(E/rubbery) and the sigmoid, 1 when cold and 0 when hot."""
         temperature = within("temperature", temperature)
-        share = expit((temperature - self.middle) / -self.width)
-        return share * self._height, share
+        middle, width, height, _ = self._sigmoid
+        share = expit((temperature - middle) / width)
+        return share * height, share
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)

@@ -274,13 +274,17 @@ class TcaBank:
             parts = [np.s_[..., i * self.n : (i + 1) * self.n] for i in range(k)]
             self._several[k] = self._law(k * self.specs) if k > 1 else self._coils, parts
         length = self._checked(states[0], "length", length)
-        temperature = np.concatenate([state.temperature for state in states], axis=-1)
-        lengths = np.concatenate(k * [length], axis=-1)
+        temperature, lengths = states[0].temperature, length
+        if k > 1:
+            temperature = np.concatenate([state.temperature for state in states], axis=-1)
+            lengths = np.concatenate(k * [length], axis=-1)
         law, parts = self._several[k]
         if self.creep is not None:
             assert isinstance(law, CoilRods)
             law = self.creep.law(law, np.concatenate([_shift(s) for s in states], axis=-1), k)
         tension, stiffness = law.tension(lengths, temperature)
+        if k == 1:
+            return [Pull(tension, stiffness, length)]
         return [Pull(tension[part], stiffness[part], length) for part in parts]
 
     def advance(
@@ -318,8 +322,7 @@ class TcaBank:
         )  # fmt: skip
         within("power", power, at_least=0.0, unit="W")
         step = self._heating
-        known = step is not None and step.heat is self.heat and isinstance(dt, float | int)
-        if step is None or not (known and step.dt == dt):
+        if step is None or step.heat is not self.heat or type(dt) is not float or step.dt != dt:
             step = self._heating = HeatStep.of(self.heat, dt)
         temperature, body, lost = step.advance(state.temperature, state.body, power)
         molten = temperature > self.melting_temperature

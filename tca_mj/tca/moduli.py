@@ -6,14 +6,15 @@ stand on the last axis.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tca_mj.checks import Array, door, floats, within
-from tca_mj.tca.arrays import column, frozen
+from tca_mj.checks import LARGEST, Array, door, floats, within
+from tca_mj.tca.arrays import ONE, ZERO, column, frozen
 from tca_mj.tca.thread import FibreSpec
 
 
@@ -164,12 +165,39 @@ def softened(
     rise = temperature - fibre.reference_temperature
     mu2, mu1, mu0 = fibre.load_softening
     fall = fibre.softening_rate * rise
-    unloaded = within(_LEFT, 1.0 - fall * mu0, above=0.0)
+    unloaded = within(_LEFT, ONE - fall * mu0, above=0.0)
     # Zero for a pushed or a cold coil, which leaves F = f (1 - k mu0).
-    load = np.maximum(stiff, 0.0) * np.maximum(fall, 0.0) * torsion_per_tension
-    linear = load * mu1 + 1.0
+    load = np.maximum(stiff, ZERO) * np.maximum(fall, ZERO) * torsion_per_tension
+    return _loaded(stiff, load, load * mu1 + ONE, unloaded, torsion_per_tension, mu2, np.sqrt)
+
+
+def softened_one(
+    temperature: float, stiff: float, torsion_per_tension: float, reference: float, rate: float,
+    mu2: float, mu1: float, mu0: float,
+) -> tuple[float, float] | None:  # fmt: skip
+    """``softened`` of one number, to the bit; None where it would raise.
+
+    Args:
+        temperature, stiff, torsion_per_tension: As there.
+        reference: The fibre's ``reference_temperature`` [°C].
+        rate: Its ``softening_rate``.
+        mu2, mu1, mu0: Its ``load_softening``.
+    """
+    fall = rate * (temperature - reference)
+    unloaded = 1.0 - fall * mu0
+    if not 0.0 < unloaded <= LARGEST:
+        return None
+    load = max(stiff, 0.0) * max(fall, 0.0) * torsion_per_tension
+    return _loaded(stiff, load, load * mu1 + 1.0, unloaded, torsion_per_tension, mu2, math.sqrt)
+
+
+def _loaded(
+    stiff: Any, load: Any, linear: Any, unloaded: Any, per: Any, mu2: Any,
+    sqrt: Callable[[Any], Any],
+) -> tuple[Any, Any]:  # fmt: skip
+    """The root of the quadratic and its slope, of numbers or arrays."""
     twice = load + load  # twice and again: 4 load
-    root = twice * mu2 * torsion_per_tension * (stiff + stiff) * unloaded
-    root = np.sqrt(linear * linear + root)
+    root = twice * mu2 * per * (stiff + stiff) * unloaded
+    root = sqrt(linear * linear + root)
     left = (unloaded + unloaded) / (linear + root)
     return stiff * left, left / root

@@ -17,7 +17,8 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tca_mj.checks import Array, Checked, Limits, Positives, within
+from tca_mj.checks import Array, Checked, Limits, Positives, every, some, within
+from tca_mj.tca.arrays import ONE, ZERO, alone
 from tca_mj.tca.thermal import HeatSpec, power_from_voltage
 
 Quantity = Literal["power", "voltage", "current", "duty", "temperature"]
@@ -72,13 +73,27 @@ class Thermostat(Checked):
         )  # fmt: skip
 
     def _power(self, temperature: Array, target: Array, body: float | Array) -> Array:
-        goal = np.minimum(target, self.max_temperature)
-        heat, error = self.heat, goal - temperature
-        steady = heat.loss * (goal - heat.ambient) + heat.conductance * (goal - body)
-        power = steady + heat.capacity * error / self.response
-        power = np.minimum(np.maximum(power, 0.0), self.max_power)
+        heat = self.heat
+        constants = self.max_power, heat.ambient, heat.loss, heat.conductance, heat.capacity
+        now = alone(temperature, target, body, *constants)
+        if now is None:
+            power = self._limited(np.minimum, np.maximum, temperature, target, body, *constants)
+        else:
+            power = np.array([self._limited(min, max, *now)])
+        if not some(temperature > self.max_temperature):  # the share is 1
+            return power
         share = (self.max_temperature + _CUT_OUT - temperature) / _LETTING_GO
-        return power * np.minimum(np.maximum(share, 0.0), 1.0)
+        return power * np.minimum(np.maximum(share, ZERO), ONE)
+
+    def _limited(
+        self, lesser: Callable[[Any, Any], Any], greater: Callable[[Any, Any], Any],
+        temperature: Any, target: Any, body: Any, most: Any, ambient: Any, loss: Any,
+        conductance: Any, capacity: Any,
+    ) -> Any:  # fmt: skip
+        goal = lesser(target, self.max_temperature)
+        steady = loss * (goal - ambient) + conductance * (goal - body)
+        power = steady + capacity * (goal - temperature) / self.response
+        return lesser(greater(power, 0.0), most)
 
 
 @dataclass(frozen=True, kw_only=True, slots=True, eq=False)
@@ -157,7 +172,8 @@ class Supply(Checked):
         if quantity == "temperature":
             assert self.thermostat is not None
             held = self.thermostat._power(temperature, command, body)
-            power = held * (command > self.thermostat.heat.ambient)
+            on = command > self.thermostat.heat.ambient
+            power = held if every(on) else held * on
         volts, amperes = self.max_voltage, self.max_current
         free = type(volts) is type(amperes) is float and volts == amperes == math.inf
         if not free or quantity in ("voltage", "current"):

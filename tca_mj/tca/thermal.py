@@ -31,6 +31,7 @@ from tca_mj.checks import (
     numbers,
     within,
 )
+from tca_mj.tca.arrays import alone
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -230,13 +231,22 @@ class HeatStep(NamedTuple):
         The heat is the integral of the balances and not the difference of energy in and energy
         stored, so that the sum of the three remains a check. Nothing is checked here.
         """
-        ambient = self.heat.ambient
+        now = alone(temperature, body, power, self.heat.ambient, *self[2:])
+        if now is None:
+            return self._advanced(temperature, body, power, self.heat.ambient, *self[2:])
+        later = self._advanced(*now)
+        return np.array(later[:1]), np.array(later[1:2]), np.array(later[2:])
+
+    @staticmethod
+    def _advanced(
+        temperature: Any, body: Any, power: Any, ambient: Any, own: Any, body_own: Any, given: Any,
+        taken: Any, warmed: Any, body_warmed: Any, lost: Any, body_lost: Any, passed: Any,
+    ) -> tuple[Any, Any, Any]:  # fmt: skip
         x, y = temperature - ambient, body - ambient
         # Changes, so that what is at rest stays there to the bit.
-        hotter = self.own * x + self.taken * y + self.warmed * power
-        warmer = self.body_own * y + self.given * x + self.body_warmed * power
-        lost = self.lost * x + self.body_lost * y + self.passed * power
-        return temperature + hotter, body + warmer, lost
+        hotter = own * x + taken * y + warmed * power
+        warmer = body_own * y + given * x + body_warmed * power
+        return temperature + hotter, body + warmer, lost * x + body_lost * y + passed * power
 
 
 def _integral(rate: Array, dt: float) -> Array:
@@ -322,10 +332,21 @@ class BareStep(NamedTuple):
 
     def advance(self, temperature: Array, power: Array) -> tuple[Array, Array]:
         """Temperature at the end [°C] and heat lost [J]."""
+        now = alone(temperature, power, *self)
+        if now is None:
+            return self._advanced(temperature, power, *self)
+        later = self._advanced(*now)
+        return np.array(later[:1]), np.array(later[1:])
+
+    @staticmethod
+    def _advanced(
+        temperature: Any, power: Any, capacity: Any, loss: Any, ambient: Any, built: Any,
+        passed: Any,
+    ) -> tuple[Any, Any]:  # fmt: skip
         # The start's excess dies out, the power's builds up: T - T_amb = x e + (P/λ) (1 - e).
-        lost = self.capacity * (temperature - self.ambient) * self.built + power * self.passed
-        settled = self.ambient + power / self.loss
-        return temperature + (settled - temperature) * self.built, lost
+        lost = capacity * (temperature - ambient) * built + power * passed
+        settled = ambient + power / loss
+        return temperature + (settled - temperature) * built, lost
 
 
 def require_bare(heat: HeatSpec) -> None:

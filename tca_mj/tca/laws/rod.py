@@ -101,6 +101,8 @@ class CoilRods:
         longest: Upper end of the law's domain, 98 % of the fibre length, shape (n,) [m].
         rest_stiffness: dF/dl of the cold coil at its natural length, shape (n,) [N/m].
         contact_stiffness: Stiffness of the coils pressed together, shape (n,) [N/m].
+        minimum: Lengths at which the coils touch, shape (n,) [m].
+        any_hot: Whether the section of a fibre grows with its temperature.
     """
 
     @door
@@ -123,7 +125,7 @@ class CoilRods:
         fibres = [spec.fibre for spec in specs]
         self._fibres = FibreTable.of(fibres)
         self._hot = np.array([fibre.section == "hot" for fibre in fibres])
-        self._any_hot = bool(self._hot.any())
+        self.any_hot = bool(self._hot.any())
 
         young, shear, area, second_moment, radius = (
             column(fibres, name) for name in ("young", "shear", "area", "second_moment", "radius")
@@ -151,9 +153,9 @@ class CoilRods:
         compliance += self._shear + sin**2 * self._excess
         self.rest_stiffness = frozen(1.0 / (self._fibre_length * compliance))
         self.contact_stiffness = frozen(column(specs, "contact_ratio") * self.rest_stiffness)
-        self._minimum = column(specs, "minimum_length")
-        self._onset = column(specs, "contact_smoothing") * self._minimum
-        self.shortest = frozen(_SHORTEST * self._minimum)
+        self.minimum = column(specs, "minimum_length")
+        self._onset = column(specs, "contact_smoothing") * self.minimum
+        self.shortest = frozen(_SHORTEST * self.minimum)
         self.longest = frozen(_LONGEST * self._fibre_length)
 
     def crept(self, sine: Array) -> CoilRods:
@@ -227,7 +229,7 @@ class CoilRods:
         per_tension = self.torsion_per_tension(temperature)
         tension, share = softened(self._fibres, temperature, stiff, per_tension)
         slope = share * slope
-        if not some(length < self._minimum):
+        if not some(length < self.minimum):
             return tension, slope
         contact, contact_slope = self._contact(length)
         return tension - contact, slope + contact_slope
@@ -264,14 +266,14 @@ class CoilRods:
 
     def torsion_per_tension(self, temperature: Array) -> Array:
         """Torsion τ = F r_t cos α*/(G J) of the fibre per tension, of its section [rad/(m N)]."""
-        if not self._any_hot:
+        if not self.any_hot:
             return self._torsion_per_tension
         growth = self._growth(temperature)
         return self._torsion_per_tension / (growth * growth * growth)
 
     def _growth(self, temperature: Array) -> Array | float:
         """Radius of the section over its radius when cold; 1 for a cold section."""
-        if not self._any_hot:
+        if not self.any_hot:
             return 1.0
         return np.where(self._hot, 1.0 + radial_growth(self._fibres, temperature), 1.0)
 
@@ -303,7 +305,7 @@ class CoilRods:
 
     def _contact(self, length: Array) -> tuple[Array, Array]:
         """Push of touching coils and -d/dl of it: zero, then a parabola, then a line."""
-        depth = self._minimum - length
+        depth = self.minimum - length
         onset = np.minimum(np.maximum(depth, 0.0), self._onset)
         beyond = np.maximum(depth - self._onset, 0.0)
         share = onset / self._onset

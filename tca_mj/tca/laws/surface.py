@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from tca_mj.checks import Array, door, every, floats
-from tca_mj.tca.arrays import column
+from tca_mj.tca.arrays import FEW, column
 from tca_mj.tca.laws.rod import CoilRods
-from tca_mj.tca.laws.table import calibrate, evaluate
+from tca_mj.tca.laws.table import calibrate, evaluate, evaluate_one
+from tca_mj.tca.moduli import FibreTable, softened_one
 from tca_mj.tca.spec import TcaSpec
 
 
@@ -67,10 +69,26 @@ class CoilSurfaces:
         self._table = np.ascontiguousarray(np.concatenate(columns, axis=1))
         self._offset = np.array([offset[id(surface)] for surface in self.surfaces])
         self._row = q + 1.0
+        self._each = self._numbers(specs) if self.n <= FEW and not self.rods.any_hot else []
+        self._cells = np.ascontiguousarray(self._table.T) if self._each else self._table.T
+
+    def _numbers(self, specs: Sequence[TcaSpec]) -> list[tuple[float, ...]]:
+        """What ``_one_by_one`` needs of each TCA."""
+        rods, n, fibres = self.rods, self.n, FibreTable.of([spec.fibre for spec in specs])
+        bounds = (np.maximum(self.shortest, rods.minimum), self.longest, self.coldest, self.hottest)
+        cells = self._start[:n], self._per_metre, self._start[n:], self._per_unit[n:]
+        twist, rate = rods.torsion_per_tension(self.coldest), fibres.softening_rate
+        fibre = twist, fibres.reference_temperature, rate, *fibres.load_softening
+        columns = *bounds, *cells, self._row, self._offset, *fibre
+        return list(zip(*(column.tolist() for column in columns), strict=True))
 
     def tension(self, length: ArrayLike, temperature: ArrayLike) -> tuple[Array, Array]:
         """Tension of the coils and its slope over length; all as ``CoilRods.tension``."""
         length, temperature = floats("length", length), floats("temperature", temperature)
+        if self._each and length.shape == temperature.shape == (self.n,):
+            found = self._one_by_one(length, temperature)
+            if found is not None:
+                return found
         if length.shape == temperature.shape and length.shape[-1:] == (self.n,):
             at = np.concatenate((length, temperature), axis=-1)
             if every(at >= self._least) and every(at <= self._most):
@@ -80,6 +98,24 @@ class CoilSurfaces:
         near = np.clip(temperature, self.coldest, self.hottest)
         read = self._read(np.concatenate((length, near), axis=-1), length, near)
         return np.where(inside, read[0], exact[0]), np.where(inside, read[1], exact[1])
+
+    def _one_by_one(self, length: Array, temperature: Array) -> tuple[Array, Array] | None:
+        """``tension`` of few TCAs, to the bit, in half the time; None if one is out of bounds."""
+        tensions, slopes, each = [], [], zip(length.tolist(), temperature.tolist(), strict=True)
+        for (long, warm), numbers in zip(each, self._each, strict=True):
+            least, most, cold, hot, start, per_metre, low, per_kelvin, row, offset, *fibre = numbers
+            if not (least <= long <= most and cold <= warm <= hot):
+                return None
+            x, y = (long - start) * per_metre, (warm - low) * per_kelvin
+            i, j = math.floor(x), math.floor(y)
+            cell = self._cells[int(i * row + (j + offset))].tolist()
+            stiff, slope = evaluate_one(cell, x - i, y - j)
+            soft = softened_one(warm, stiff, *fibre)
+            if soft is None:
+                return None
+            tensions.append(soft[0])
+            slopes.append(soft[1] * (slope * per_metre))
+        return np.array(tensions), np.array(slopes)
 
     def _read(self, at: Array, length: Array, temperature: Array) -> tuple[Array, Array]:
         inside = (at - self._start) * self._per_unit

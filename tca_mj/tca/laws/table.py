@@ -15,8 +15,10 @@ in the table, too, to rounding. A table is made in some 20 ms and kept while Pyt
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import astuple, dataclass, replace
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 
@@ -233,7 +235,19 @@ def evaluate(cell: Array, u: Array, v: Array) -> tuple[Array, Array]:
     cubic += cell[4:8]
     cubic *= v
     cubic += cell[:4]
-    u_c3 = u * cubic[3]  # Horner's scheme for both at once
-    b2 = cubic[2] + u_c3
-    b1 = cubic[1] + u * b2
-    return cubic[0] + u * b1, b1 + u * (b2 + u_c3)
+    return _along(cubic, u)
+
+
+def evaluate_one(cell: Sequence[float], u: float, v: float) -> tuple[float, float]:
+    """``evaluate`` of one polynomial, to the bit: of few of them a tenth of the time."""
+    rows = zip(cell[:4], cell[4:8], cell[8:], strict=True)
+    return _along([(second * v + first) * v + zeroth for zeroth, first, second in rows], u)
+
+
+def _along(cubic: Any, u: Any) -> tuple[Any, Any]:
+    """Value and derivative by u of cubic polynomials: Horner's scheme for both at once."""
+    c0, c1, c2, c3 = cubic
+    u_c3 = u * c3
+    b2 = c2 + u_c3
+    b1 = c1 + u * b2
+    return c0 + u * b1, b1 + u * (b2 + u_c3)

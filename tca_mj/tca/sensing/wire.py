@@ -43,7 +43,7 @@ from tca_mj.checks import (
     whole,
     within,
 )
-from tca_mj.tca.arrays import column
+from tca_mj.tca.arrays import FEW, ONE, ZERO, column
 from tca_mj.tca.spec import TcaSpec
 
 
@@ -99,10 +99,15 @@ def resistance(
     """
     instance("wire", wire, WireTable)
     temperature, length = floats("temperature", temperature), floats("length", length)
+    if length.shape == temperature.shape == wire.rest_length.shape and length.size <= FEW:
+        few = _one_by_one(wire, length, temperature)
+        if few is not None:
+            return few
     with np.errstate(invalid="ignore"):
-        short = 1.0 - length / wire.rest_length
-        left = np.where(short < 0.0, wire.stretch, wire.contraction) * short + 1.0
-    good = (np.minimum(length, left) > 0.0) & np.isfinite(temperature)
+        short = ONE - length / wire.rest_length
+        left = np.where(short < ZERO, wire.stretch, wire.contraction) * short + ONE
+    good = np.minimum(length, left) > ZERO
+    good &= np.isfinite(temperature)
     if not every(good):
         if strict:
             within("temperature", temperature)
@@ -110,6 +115,19 @@ def resistance(
             within("share of resistance left at this length", left, above=0.0)
         left = np.where(good, left, np.nan)
     return wire.rest_resistance * left
+
+
+def _one_by_one(wire: WireTable, length: Array, temperature: Array) -> Array | None:
+    """Resistance of few TCAs, to the bit; None if one has none."""
+    found = []
+    columns = [column.tolist() for column in (length, temperature, *wire)]
+    for long, warm, rest, ohms, stretch, contraction in zip(*columns, strict=True):
+        short = 1.0 - long / rest
+        left = (stretch if short < 0.0 else contraction) * short + 1.0
+        if not (long > 0.0 and left > 0.0 and math.isfinite(warm)):
+            return None
+        found.append(ohms * left)
+    return np.array(found)
 
 
 @door
