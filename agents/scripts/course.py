@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tca_mj.agents.scripts.tetrapod import CRAWL, SHIMMY, WALK
-from tca_mj.checks import Checked, Edge, door
+from tca_mj.checks import Checked, Edge, NotNegative, door
 from tca_mj.control import Gait, Thermostat
 from tca_mj.envs.course import OBSERVATION, Places, TetrapodCourse
 from tca_mj.robots.tetrapod import SPINES
@@ -55,11 +55,14 @@ class Go(Checked):
     Attributes:
         name: Name of the stage.
         gait: Whose temperatures the legs follow; several are tried in turn where one does not get
-            on. A name is that of a shape in which the walker has learned to get on.
+            on, or is slower than ``pace``. A name is that of a shape in which the walker has
+            learned to get on.
         until: Where the stage ends, along x [m].
         patience: Time without headway after which the stage ends wherever the body is [s].
         steers: Whether the legs of one side become weaker where the heading is off.
         above: Height of what the robot stands on, of which a learned gait sees its own [m].
+        pace: Headway below which the next gait is tried, and once all were, the fastest of them
+            [m/s]; 0 to try another only where there is none.
         clings: Whether the spines' TCAs go on pulling: without them a rigid U gives way by a
             degree, which is all that weak ones have clamped by.
     """
@@ -70,6 +73,7 @@ class Go(Checked):
     patience: Edge = math.inf
     steers: bool = False
     above: float = 0.0
+    pace: NotNegative = 0.0
     clings: bool = False
 
 
@@ -149,6 +153,7 @@ class CourseWalker:
     clinging = 0.05  # the same of rigid ones that still pull [K/s]
     hottest = 172.0  # temperature that no TCA is to exceed [°C]
     stalled = 35.0  # time without headway after which another gait is tried [s]
+    trial = 20.0  # time after which the headway of a gait is judged by its pace [s]
 
     def __init__(
         self,
@@ -196,6 +201,7 @@ class CourseWalker:
         self._part = "soften"
         self._best, self._since = -math.inf, 0.0  # foremost place in this stage, and when
         self._choice, self._tried = 0, 0.0  # which gait of several, and since when
+        self._from, self._headway = math.nan, dict[int, float]()  # its start, and that of each
         self._integral = 0.0
         self._target = 25.0  # of the spines' TCAs
         self._angle: float | None = None
@@ -232,14 +238,30 @@ class CourseWalker:
         stage = self._plan[self._number]
         if isinstance(stage, Go):
             x = float(seen["position"][0])
+            if stage.pace and isinstance(stage.gait, tuple):
+                self._judge(x, stage.pace, len(stage.gait))
             if x > self._best + 2e-3:
-                self._best, self._since, self._tried = x, self._time, self._time
-            elif self._time - self._tried > self.stalled:
+                self._best, self._since = x, self._time
+                self._tried = self._tried if stage.pace else self._time
+            elif self._time - self._tried > self.stalled and not stage.pace:
                 self._choice, self._tried = self._choice + 1, self._time
             return x >= stage.until or self._time - self._since > stage.patience
         if stage.enough is not None and self._time == 0.0:
             return float(seen["body angle"][0]) <= stage.enough
         return self._part == "done"
+
+    def _judge(self, x: float, pace: float, gaits: int) -> None:
+        """Goes on with the gait, the next one, or the fastest of all that were tried."""
+        if math.isnan(self._from):
+            self._from = x
+        if self._time - self._tried < self.trial:
+            return
+        found = self._headway
+        found[self._choice] = (x - self._from) / (self._time - self._tried)
+        if found[self._choice] < pace:
+            left = [each for each in range(gaits) if each not in found]
+            self._choice = left[0] if left else max(found, key=found.__getitem__)
+        self._from, self._tried = x, self._time
 
     def _walk(self, stage: Go, seen: dict[str, Array]) -> Array:
         gaits = stage.gait if isinstance(stage.gait, tuple) else (stage.gait,)

@@ -20,8 +20,9 @@ from numpy.typing import NDArray
 from tca_mj.agents.policies.files import SavedPolicy
 from tca_mj.agents.policies.load import find
 from tca_mj.agents.policies.network import Network
-from tca_mj.agents.scripts.course import HURRY, PUSH, STEP, Bend, CourseWalker, Go
+from tca_mj.agents.scripts.course import HURRY, STEP, Bend, CourseWalker, Go
 from tca_mj.agents.scripts.tetrapod import CRAWL, WALK
+from tca_mj.control import Gait
 from tca_mj.envs.command import Command, Following
 from tca_mj.envs.course import Places, TetrapodCourse
 from tca_mj.envs.gaits import TASKS, told
@@ -31,13 +32,16 @@ from tca_mj.variation import AMBIENT
 
 Array = NDArray[np.float64]
 
-SHOVE = replace(PUSH, hot=(TetrapodCourse.safe_temperature,) * 3, warm=(60.0,) * 3)
-"""``PUSH`` with hotter TCAs, which are quicker: 15 % faster on the robot that it was tried on."""
+SHOVE = Gait(
+    period=4.94, offset=(0.0, 0.0, 0.843, 0.843), start=(0.938, 0.240, 0.457),
+    duty=(0.263, 0.296, 0.452), hot=(TetrapodCourse.safe_temperature,) * 3, warm=(77.0, 72.0, 54.0),
+)  # fmt: skip
+"""How to get onto the beam: the rear legs push a sixth of a cycle after the front ones. Searched by
+CMA-ES, begun with ``PUSH``, for headway on three robots that are off in everything (seeds 101, 104
+and 106): 2.9, 2.9 and 1.4 mm/s, where ``PUSH`` with as hot TCAs has 2.0, 1.3 and 0.2."""
 
-SCRIPTED: dict[str, Any] = {"crawl": CRAWL, "walk": WALK, "mount": SHOVE, "shimmy": HURRY}
-LEARNED: dict[str, Any] = {
-    "crawl": "crawl", "walk": "walk", "mount": SHOVE, "shimmy": ("shimmy", *HURRY),
-}  # fmt: skip
+SCRIPTED: dict[str, Any] = {"crawl": CRAWL, "walk": WALK, "mount": SHOVE, "shimmy": HURRY[:1]}
+LEARNED: dict[str, Any] = {"crawl": "crawl", "walk": "walk", "mount": SHOVE, "shimmy": ("shimmy",)}
 SPECIALISTS = {gait: f"tetrapod-{gait}-sac" for gait in TASKS}
 SHAPES = dict.fromkeys(TASKS, "tetrapod-shapes")
 
@@ -52,7 +56,14 @@ def quick(places: Places, gaits: Mapping[str, Any]) -> tuple[Go | Bend, ...]:
     station, edge, end = places.leg_station, places.first_edge, places.beam_end
     walking, wide = math.radians(95.0), math.radians(115.0)
     crawl, walk = gaits["crawl"], gaits["walk"]
-    astride: dict[str, Any] = {"gait": gaits["shimmy"], "above": places.beam_top, "clings": True}
+    # Weak TCAs need more time for a stroke than the shimmy gives them.
+    found = SavedPolicy.read(find("tetrapod-shimmy")).gait
+    assert found is not None
+    strokes = (replace(found, period=1.6 * found.period), HURRY[2], found, *HURRY[:2])
+    astride: dict[str, Any] = {
+        "gait": (*gaits["shimmy"], *strokes), "above": places.beam_top, "clings": True,
+        "pace": 1e-3,
+    }  # fmt: skip
     brisk: dict[str, Any] = {"brisk": True, "stiff": 88.0, "rest": 0.0}
     return (
         Go(name="crawl", gait=crawl, until=places.stand, steers=True),
@@ -171,9 +182,11 @@ def scripted(env: gym.Env[Any, Any]) -> CourseWalker:
 
 
 def searched(env: gym.Env[Any, Any]) -> CourseWalker:
-    """With the searched crawl and walk that come with the package."""
-    found = {gait: SavedPolicy.read(find(f"tetrapod-{gait}")).gait for gait in ("crawl", "walk")}
-    return _walker(env, SCRIPTED | {gait: known for gait, known in found.items() if known})
+    """With the searched gaits that come with the package."""
+    found: dict[str, Any] = {
+        gait: SavedPolicy.read(find(f"tetrapod-{gait}")).gait for gait in SPECIALISTS
+    }
+    return _walker(env, SCRIPTED | found | {"shimmy": (found["shimmy"],)})
 
 
 def specialists(env: gym.Env[Any, Any]) -> CourseWalker:
