@@ -40,6 +40,9 @@ SHOVE = Gait(
 CMA-ES, begun with ``PUSH``, for headway on three robots that are off in everything (seeds 101, 104
 and 106): 2.9, 2.9 and 1.4 mm/s, where ``PUSH`` with as hot TCAs has 2.0, 1.3 and 0.2."""
 
+_BACK, _MOST = 8.0, 0.12  # turn over the way aside [rad/m], and the largest [rad]
+_TURN = 2.0 * math.pi
+
 SCRIPTED: dict[str, Any] = {"crawl": CRAWL, "walk": WALK, "mount": SHOVE, "shimmy": HURRY[:1]}
 LEARNED: dict[str, Any] = {"crawl": "crawl", "walk": "walk", "mount": SHOVE, "shimmy": ("shimmy",)}
 SPECIALISTS = {gait: f"tetrapod-{gait}-sac" for gait in TASKS}
@@ -55,7 +58,9 @@ def quick(places: Places, gaits: Mapping[str, Any]) -> tuple[Go | Bend, ...]:
     """
     station, edge, end = places.leg_station, places.first_edge, places.beam_end
     walking, wide = math.radians(95.0), math.radians(115.0)
-    crawl, walk = gaits["crawl"], gaits["walk"]
+    # A gait that gets stuck, as a learned one may where it has not learned to be, is relieved.
+    crawl: dict[str, Any] = {"gait": (gaits["crawl"], CRAWL), "steers": True, "pace": 2e-3}
+    walk: dict[str, Any] = {"gait": (gaits["walk"], WALK), "steers": True, "pace": 2e-3}
     # Weak TCAs need more time for a stroke than the shimmy gives them.
     found = SavedPolicy.read(find("tetrapod-shimmy")).gait
     assert found is not None
@@ -66,9 +71,10 @@ def quick(places: Places, gaits: Mapping[str, Any]) -> tuple[Go | Bend, ...]:
     }  # fmt: skip
     brisk: dict[str, Any] = {"brisk": True, "stiff": 88.0, "rest": 0.0}
     return (
-        Go(name="crawl", gait=crawl, until=places.stand, steers=True),
+        Go(name="crawl", until=places.stand, **crawl),
         Bend(name="stand up", angle=walking, steps=WALK, ahead=0.03, **brisk),
-        Go(name="walk", gait=walk, until=edge - station + 0.019, steers=True),
+        # Some stand with their front legs over the edge before; from there, too, they mount.
+        Go(name="walk", until=edge - station + 0.019, patience=15.0, **walk),
         # A robot that falls back as it comes to lie on the beam needs a minute to make up for it.
         Go(name="mount", gait=gaits["mount"], until=edge + station + 0.004, patience=90.0,
            steers=True),
@@ -80,7 +86,7 @@ def quick(places: Places, gaits: Mapping[str, Any]) -> tuple[Go | Bend, ...]:
                  **{**brisk, "rest": 10.0})
             for angle in (165.0, 130.0, 97.0, 97.0, 97.0)
         ),
-        Go(name="walk on", gait=walk, until=places.target, steers=True, above=places.lower),
+        Go(name="walk on", until=places.target, above=places.lower, **walk),
         Bend(name="lie down", angle=None, steps=STEP, ahead=0.05, brisk=True, rest=0.0),
     )  # fmt: skip
 
@@ -170,7 +176,10 @@ class Learned:
         period = learned.period
         if self._time % period < dt / 2.0 or period - self._time % period < dt / 2.0:
             rows = task.stance.sensed(task.sim, above)
-            rows |= told(self._following, turn, shape.fastest)
+            # On the ground it is told to look back to the line: from 10 mm aside by 5 degrees.
+            ahead = 0.0 if shape.beam else min(max(-_BACK * y, -_MOST), _MOST)
+            now = self._following._replace(heading=ahead, error=math.remainder(ahead - yaw, _TURN))
+            rows |= told(now, turn, shape.fastest)
             self._asked = learned.temperatures(rows)
         self._time += dt
         return self._asked.copy()
