@@ -210,8 +210,11 @@ class CourseWalker:
         """The next action."""
         seen = OBSERVATION.read(observation)
         while self._number < len(self._plan) and self._over(seen):
+            known = self._choice, self._headway
             self._number += 1
             self._enter()
+            if self._goes_on():
+                self._choice, self._headway = known
         legs, spines, voltage = np.full((4, 3), _OFF), _OFF, np.zeros(3)
         blows = seen["spine temperature"].max() > self.rigid
         if self._number < len(self._plan):
@@ -249,6 +252,12 @@ class CourseWalker:
         if stage.enough is not None and self._time == 0.0:
             return float(seen["body angle"][0]) <= stage.enough
         return self._part == "done"
+
+    def _goes_on(self) -> bool:
+        """Whether the stage has the gaits of the one before, whose headway is known."""
+        before, now = self._plan[self._number - 1], self._plan[self._number : self._number + 1]
+        return bool(now and isinstance(before, Go) and isinstance(now[0], Go) and before.pace
+                    and now[0].gait == before.gait)  # fmt: skip
 
     def _judge(self, x: float, pace: float, gaits: int) -> None:
         """Goes on with the gait, the next one, or the fastest of all that were tried."""
