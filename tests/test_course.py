@@ -292,6 +292,31 @@ def test_spines_go_on_pulling_once_they_are_rigid_only_where_the_robot_clings(cl
     assert np.all(action[12:15] > -1.0) == clings
 
 
+@pytest.mark.parametrize(
+    ("speeds", "first", "at_last"),
+    [((2.0, 9.0), 0, 0), ((0.2, 1.5, 9.0), 1, 1), ((0.2, 0.9, 0.5), 1, 1)],
+)
+def test_the_first_gait_that_keeps_the_pace_is_kept_and_else_the_fastest(
+    speeds, first, at_last, shared
+):
+    """Speeds in mm/s, where 1 is wanted; each is tried for 20 s."""
+    stage = Go(name="shimmy", gait=(STEP,) * len(speeds), until=9.0, pace=1e-3)
+    walker, x = CourseWalker(shared, (stage, stage)), 0.0
+    for step in range(2000):
+        walker._time = 0.1 * step
+        walker._judge(x, stage.pace, len(speeds))
+        x += 1e-4 * speeds[walker._choice]
+        if step == 399:
+            assert walker._choice == first
+    assert walker._choice == at_last
+    # The next stage with the same gaits knows what this one has found; another does not.
+    seen = OBSERVATION.read(shared.seen())
+    walker._plan, found = (replace(stage, until=-9.0), stage), dict(walker._headway)
+    walker.act(shared.seen())
+    assert walker.phase == "shimmy" and walker._number == 1 and seen["position"][0] > -9.0
+    assert (walker._choice, walker._headway) == (at_last, found)
+
+
 def test_the_crawl_goes_forward_and_the_walk_is_faster():
     """A few cycles of each; over the whole course the demo prints the speeds."""
     speeds = {}
