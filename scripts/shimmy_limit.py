@@ -1,6 +1,6 @@
 """What limits the shimmy: the searched gait told as temperatures, and sought on single robots.
 
-    python scripts/shimmy_limit.py                       the first four of the 16 robots
+    python scripts/shimmy_limit.py                       the first three of the 16 robots
     python scripts/shimmy_limit.py --seeds 1014 --generations 30
     python scripts/shimmy_limit.py --replay              held for longer, in other cycles
 
@@ -36,8 +36,8 @@ COARSE = 10e-3  # physics time step of the search [s]
 WARM, JUDGED = 6.0, 16.0  # time that is not judged, and that is, rounded to whole cycles [s]
 WHOLE = 60.0  # an episode [s]
 ROBOTS = tuple(range(1000, 1016))  # those of docs/gaits.md
-HOLDS = (0.1, 0.2, 0.4, 0.5)  # [s]
-PERIODS = (4.4, 5.0, 5.6, 6.4)  # [s]
+HOLDS = (0.2, 0.4, 0.5)  # [s]
+PERIODS = (5.0, 5.3, 5.9, 6.4, 7.2)  # [s]
 SIGMA, POPULATION = 0.04, 15  # of the search; the cube of all gaits has edges of 1
 
 
@@ -105,14 +105,14 @@ def sought(start: Gait, seed: int, generations: int) -> Gait:
 
 def replayed(start: Gait) -> list[str]:
     """The gait on the 16 robots: held for some times, and with other periods."""
-    rows = []
+    rows, best = [], np.zeros(len(ROBOTS))
     for held in HOLDS:
         speeds = _on_robots(start, held)
-        rows.append([f"{held:g} s", f"{start.period:.1f} s", f"{1e3 * speeds.mean():.2f}"])
-    best = np.zeros(len(ROBOTS))
+        best = np.maximum(best, speeds) if held == PERIOD else best
+        rows.append([f"{held:g} s", f"{start.period:.2f} s", f"{1e3 * speeds.mean():.2f}"])
     for period in PERIODS:
         speeds = _on_robots(replace(start, period=period), PERIOD)
-        rows.append([f"{PERIOD:g} s", f"{period:.1f} s", f"{1e3 * speeds.mean():.2f}"])
+        rows.append([f"{PERIOD:g} s", f"{period:.2f} s", f"{1e3 * speeds.mean():.2f}"])
         best = np.maximum(best, speeds)
     rows.append([f"{PERIOD:g} s", "the best of these for each robot", f"{1e3 * best.mean():.2f}"])
     return table(["held for", "cycle", "16 robots [mm/s]"], rows)
@@ -128,7 +128,7 @@ def _on_robots(gait: Gait, held: float) -> Array:
 
 def main(argv: list[str] | None = None) -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--seeds", type=int, nargs="+", default=[1000, 1001, 1002, 1003])
+    parser.add_argument("--seeds", type=int, nargs="+", default=[1000, 1001, 1002])
     parser.add_argument("--generations", type=int, default=15)
     parser.add_argument("--replay", action="store_true", help="nothing is sought")
     arguments = parser.parse_args(argv)
