@@ -35,6 +35,9 @@ class Recipe(Checked):
         scaled: Whether observations are scaled by the table; otherwise they, and the rewards, are
             normalised by running statistics.
         mirrored: Whether half of each batch of memories is mirrored, left for right.
+        alike: Whether left and right are told the same, so that there is half as much to learn;
+            not while commands grow.
+        centred: Whether rewards count from the mean of a gait's first steps.
         growth: Options that grow from 0 to the value that is given, and in how many steps. With one
             of them memories are also told with other commands, and mirrored front for rear.
         grown: Fields of this that are others where one of them is given.
@@ -57,6 +60,8 @@ class Recipe(Checked):
     options: Mapping[str, float] = field(default_factory=dict)
     scaled: bool = False
     mirrored: bool = False
+    alike: bool = False
+    centred: bool = False
     growth: Mapping[str, int] = field(default_factory=dict)
     grown: Mapping[str, Any] = field(default_factory=dict)
     discount: _Discount | None = None
@@ -77,7 +82,5 @@ class Recipe(Checked):
         Raises:
             ValueError: If a field is out of bounds.
         """
-        return cls(
-            steps=steps, control_period=control_period, scaled=True, discount=0.94,
-            **{"interval": 1000, "learner": HELD, **more},
-        )  # fmt: skip
+        usual = {"discount": 0.94, "interval": 1000, "learner": HELD}
+        return cls(steps=steps, control_period=control_period, scaled=True, **{**usual, **more})

@@ -152,6 +152,19 @@ class Table:
         return self._sides
 
     @property
+    def pairs(self) -> NDArray[np.int64]:
+        """Which of fewer numbers each place gets where what a mirror swaps is the same, (size,).
+
+        Raises:
+            ValueError: If no row says how, or a sign changes.
+        """
+        source, sign = self.mirror
+        if (sign < 0.0).any():
+            raise ValueError("the table must have a mirror without signs, got one with some")
+        first: NDArray[np.int64] = np.minimum(np.arange(self.size), source)
+        return np.unique(first, return_inverse=True)[1]
+
+    @property
     def ends(self) -> Mirror:
         """The same of the mirror that swaps front and rear.
 

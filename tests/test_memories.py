@@ -124,6 +124,13 @@ def test_half_of_a_batch_is_mirrored_and_all_of_it_was_lived(tasks):
     assert sides == 32 and (batch.dones == 0.0).all()  # time was up, nothing ended
 
 
+def test_who_is_told_the_same_on_both_sides_keeps_that_in_the_mirror(tasks):
+    settings = mirrored_memory(tasks, alike=True)["replay_buffer_kwargs"]
+    told = np.random.default_rng(0).uniform(-1.0, 1.0, 6)
+    np.testing.assert_array_equal(settings["action"].mirrored(told), told)
+    assert settings["observation"] is tasks.tasks.envs[0].observation
+
+
 def test_retold_memories_keep_what_was_done_and_come_from_the_seed(tasks):
     buffer, lived = filled(tasks, retold=True, seed=5)
     again, _ = filled(tasks, retold=True, seed=5)

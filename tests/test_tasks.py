@@ -8,6 +8,7 @@ import pytest
 
 from tca_mj.envs.morph import OBSERVATION, MorphModule
 from tca_mj.envs.outcome import Verdict
+from tca_mj.envs.table import Entry, Table
 from tca_mj.registry import TASKS
 from tca_mj.testing import CHECKS, check_task
 
@@ -98,6 +99,16 @@ def test_the_mirror_that_a_task_declares_is_that_of_its_physics(id):
         action = random.uniform(-1.0, 1.0, one.action.size).astype(np.float32)
         seen, *_ = one.step(action)
         image, *_ = other.step(one.action.mirrored(action))
+
+
+def test_pairs_are_what_a_mirror_swaps():
+    table = gym.make("TCA/TetrapodWalk-v0", disable_env_checker=True).unwrapped.action
+    told = np.random.default_rng(0).uniform(-1.0, 1.0, 6)[table.pairs]
+    np.testing.assert_array_equal(table.mirrored(told), told)
+    assert sorted(table.pairs) == sorted(2 * [*range(6)])
+    turned = Table([Entry("turn", 2, -1.0, 1.0, "rad", mirror=(-2, -1))])
+    with pytest.raises(ValueError, match="mirror without signs"):
+        _ = turned.pairs
 
 
 @pytest.mark.parametrize("id", [task.id for task in TASKS])

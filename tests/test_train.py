@@ -28,11 +28,13 @@ from tca_mj.agents.train.learning_env import LearningEnv
 from tca_mj.agents.train.runs import RunFolder
 from tca_mj.agents.train.sb3_env import TaskVecEnv
 from tca_mj.cli import main
+from tca_mj.envs import gaits
 from tca_mj.registry import TASKS
 
 QUICK = "TCA/MorphModule-v0"
 GAIT = GAITS["walk"], (STEERING["walk"],) * 4
 WALK = "TCA/TetrapodWalk-v0"
+GAIT_ACTION = gaits.ACTION
 REMEMBERED = OffPolicy(
     buffer_size=60, learning_starts=16, gradient_steps=1, batch_size=8, hidden=(8,), last_rate=0.5
 )
@@ -140,6 +142,49 @@ def test_a_run_from_a_gait_goes_on_as_one_that_is_not_broken_off(tmp_path, monke
         with suppress(KeyboardInterrupt):
             train(config, tmp_path / "parts", progress=False)
     assert written(tmp_path / "parts") == written(tmp_path / "whole")
+
+
+@pytest.mark.usefixtures("quiet")
+def test_left_and_right_are_told_the_same(tmp_path, monkeypatch):
+    """The policy says so for whatever is seen; it goes on as others do."""
+    config = walking(alike=True, centred=True)
+    found = train(config, tmp_path / "whole", progress=False)
+    source, _ = GAIT_ACTION.mirror
+    random = np.random.default_rng(0)
+    centre, scale = found.network.units
+    for _ in range(5):
+        action = found.network(centre + 0.3 * scale * random.normal(size=len(scale)))
+        np.testing.assert_array_equal(action, action[source])
+        assert len(set(action.tolist())) > 3  # not all of them, as some may be at their bounds
+    for _ in broken_off_after((7, 33, 200), monkeypatch):
+        with suppress(KeyboardInterrupt):
+            train(config, tmp_path / "parts", progress=False)
+    assert written(tmp_path / "parts") == written(tmp_path / "whole")
+
+
+@pytest.mark.usefixtures("quiet")
+def test_rewards_count_from_those_of_the_first_steps(tmp_path):
+    runs = []
+    for centred in (False, True):
+        config = walking(alike=True, centred=centred)
+        with closing(Run(config, RunFolder(tmp_path / str(centred), config, ""))) as run:
+            run.demonstrate()
+            memory = run.model.replay_buffer
+            assert memory.actions.shape[-1] == 6
+            runs.append((memory.rewards[: memory.size()].copy(), run.env.level))
+            if centred:  # what the learner is told from now on, and what is noted of an episode
+                one, _ = runs[0]
+                assert run.env.level == pytest.approx(one.mean(), rel=1e-6) and one.std() > 0.0
+                actions = np.zeros((2, 6), dtype=np.float32)
+                raw = run.env.venv
+                run.env.step_async(actions)
+                outcome = raw.step_wait()
+                raw.step_wait = lambda outcome=outcome: outcome
+                told = run.env.step_wait()[1]
+                assert told == pytest.approx(outcome[1] - run.env.level, abs=1e-6)
+    (plain, none), (counted, level) = runs[:2]
+    assert none == 0.0
+    np.testing.assert_allclose(counted, plain - level, atol=1e-6)
 
 
 @pytest.mark.parametrize(
@@ -347,6 +392,8 @@ def test_every_task_has_a_default(task, algorithm, tmp_path):
         ({"steps": 0}, "steps must be"),
         ({"residual": 60.0}, "residual must be finite and at least 0 and at most 50 K"),
         ({"residual": 10.0}, "which has no gait"),
+        ({"centred": True}, "centred must be False where no gait makes the first steps"),
+        ({"alike": True}, "alike must be False where memories are not mirrored"),
     ],
 )
 def test_impossible_settings_are_refused(change, message):

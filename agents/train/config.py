@@ -133,6 +133,9 @@ class TrainConfig(Checked):
         scaled: Whether observations are scaled by the task's table; otherwise they and the rewards
             are normalised by running statistics.
         mirrored: Whether half of each batch of memories is mirrored, left for right.
+        alike: Whether left and right TCAs are told the same: an action has a number for each pair.
+        centred: Whether rewards count from the mean of the gait's first steps, near which a critic
+            that knows nothing begins.
         retold: Whether memories are also told with other commands, and mirrored front for rear.
         growth: Options that grow from 0 to their value, and in how many steps: a robot first learns
             to get on, then wherever it is told.
@@ -162,6 +165,8 @@ class TrainConfig(Checked):
     timestep: Positive | None = None
     scaled: bool = False
     mirrored: bool = False
+    alike: bool = False
+    centred: bool = False
     retold: bool = False
     growth: Mapping[str, Steps] = field(default_factory=dict)
     residual: Annotated[float, partial(number, at_least=0.0, at_most=50.0, unit="K")] = 0.0
@@ -210,6 +215,13 @@ class TrainConfig(Checked):
                     "arguments['action'] must be 'temperature' where a gait makes the first steps,"
                     f" got {shown(self.arguments)}"
                 )
+        if self.alike and (self.residual or self.retold or not self.mirrored):
+            raise ValueError(
+                "alike must be False where memories are not mirrored, are told with other commands"
+                " or a gait is corrected, got True"
+            )
+        if self.centred and (self.residual or self.start == "random"):
+            raise ValueError("centred must be False where no gait makes the first steps, got True")
         if self.residual and self.arguments.get("action") != "power":
             raise ValueError(
                 "arguments['action'] must be 'power' where a gait is corrected, got"
@@ -267,6 +279,8 @@ def default_config(task: str, algorithm: str | None = None, **change: Any) -> Tr
         "start": recipe.start,
         "scaled": recipe.scaled,
         "mirrored": recipe.mirrored,
+        "alike": recipe.alike and not growing,
+        "centred": recipe.centred and change.get("start", recipe.start) != "random",
         "retold": recipe.mirrored and bool(growing),
         "growth": growing,
     }
@@ -295,6 +309,8 @@ def described(config: TrainConfig) -> str:
         *([f"physics at {1e3 * config.timestep:g} ms"] if config.timestep else []),
         *(["scaled observations"] if config.scaled else []),
         *(["mirrored memories"] if config.mirrored else []),
+        *(["left and right told the same"] if config.alike else []),
+        *(["rewards from the gait's on"] if config.centred else []),
         *(["told with other commands"] if config.retold else []),
         *([f"first steps by the gait '{config.start}'"] if config.start != "random" else []),
         *(f"{name} grown in {steps} steps" for name, steps in config.growth.items()),

@@ -14,13 +14,14 @@ import pickle
 import random
 import shutil
 from contextlib import ExitStack, closing
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import gymnasium as gym
 import numpy as np
 import torch
+from numpy.typing import NDArray
 from sb3_contrib import TQC, CrossQ
 from stable_baselines3 import PPO, SAC, TD3
 from stable_baselines3.common.base_class import BaseAlgorithm
@@ -166,7 +167,7 @@ class Run:
             config.task, config.envs, reset_options=dict(config.options), scaled=config.scaled,
             **config.made_with, **coarser,
         )  # fmt: skip
-        self.env = LearningEnv(tasks, self._gait, config.residual)
+        self.env = LearningEnv(tasks, self._gait, config.residual, config.alike)
         if state is None:
             running = not config.scaled
             self.normalise = VecNormalize(
@@ -213,7 +214,12 @@ class Run:
         self.begin()
         gait = first_gaits(config.task, config.start)
         first = min(config.learner.learning_starts, config.steps)  # type: ignore[union-attr]
-        demonstrate(self.model, self.env.venv.tasks.envs, gait, first, config.seed)
+        demonstrate(self.model, self.env.venv.tasks.envs, gait, first, config.seed, self.env.pairs)
+        if config.centred:
+            memory: Any = self.model.replay_buffer  # type: ignore[attr-defined]
+            earned = memory.rewards[: memory.size()]
+            self.env.level = float(earned.mean(dtype=np.float64))
+            earned -= np.float32(self.env.level)
 
     def mark(self, *, last: bool = False) -> None:
         """Adds a row to the curve, evaluates if it is time to, and writes all there is."""
@@ -250,8 +256,9 @@ class Run:
         config = self.config
         gait, steering = self._gait or (None, ())
         source = f"corrects the gait '{config.start}'" if gait else ""
+        network = exported(self.model, self.normalise, self._units, self.env.pairs)
         return SavedPolicy(
-            task=config.task, network=exported(self.model, self.normalise, self._units), gait=gait,
+            task=config.task, network=network, gait=gait,
             steering=steering, bound=config.residual, arguments=config.arguments,
             made_for=self._made_for,
             origin=self.folder.origin(config.algorithm, self.model.num_timesteps, source),
@@ -354,7 +361,9 @@ def learner(config: TrainConfig, env: VecEnv) -> BaseAlgorithm:
         settings["action_noise"] = NormalActionNoise(np.zeros(n), np.full(n, settings["noise"]))
     if config.mirrored:
         assert isinstance(env.unwrapped, TaskVecEnv)
-        settings |= mirrored_memory(env.unwrapped, retold=config.retold, seed=config.seed)
+        settings |= mirrored_memory(
+            env.unwrapped, retold=config.retold, alike=config.alike, seed=config.seed
+        )
     known = inspect.signature(kind).parameters
     model: BaseAlgorithm = kind(
         "MlpPolicy", env, seed=config.seed, device="cpu", policy_kwargs=network,
@@ -363,13 +372,17 @@ def learner(config: TrainConfig, env: VecEnv) -> BaseAlgorithm:
     return model
 
 
-def exported(model: BaseAlgorithm, normalise: VecNormalize, units: Any) -> Network:
+def exported(
+    model: BaseAlgorithm, normalise: VecNormalize, units: Any,
+    pairs: NDArray[np.int64] | None = None,
+) -> Network:  # fmt: skip
     """What a model does without noise, as plain numbers.
 
     Args:
         model: The model.
         normalise: What normalises its observations, or does not.
         units: Centre and scale by which they are taken first; None for as they are.
+        pairs: Which of its numbers each of the task's gets; None for the same.
     """
     statistics = None
     if normalise.norm_obs:
@@ -380,7 +393,14 @@ def exported(model: BaseAlgorithm, normalise: VecNormalize, units: Any) -> Netwo
         )  # fmt: skip
     buffer = io.BytesIO()
     model.save(buffer)
-    return Model.parsed(buffer.getvalue(), "").preprocessed(units, statistics)
+    network = Model.parsed(buffer.getvalue(), "").preprocessed(units, statistics)
+    if pairs is None:
+        return network
+    (*weights, weight), (*biases, bias) = network.weights, network.biases
+    bounds = None if network.bounds is None else network.bounds[:, pairs]
+    return replace(
+        network, weights=(*weights, weight[pairs]), biases=(*biases, bias[pairs]), bounds=bounds
+    )
 
 
 def _generators(model: BaseAlgorithm) -> dict[str, Any]:

@@ -20,7 +20,7 @@ _HURRY, _NOISE = 0.1, 0.15
 
 def demonstrate(
     model: BaseAlgorithm, tasks: list[SimulatedTask], gait: Callable[[SimulatedTask], Gait],
-    steps: int, seed: int,
+    steps: int, seed: int, pairs: NDArray[np.int64] | None = None,
 ) -> None:  # fmt: skip
     """Fills the memory of a new learner with steps of a gait, in place of steps by chance.
 
@@ -33,6 +33,8 @@ def demonstrate(
         gait: The gait of an episode that a task has just begun.
         steps: Steps of all tasks together.
         seed: Seed of what is drawn.
+        pairs: Which number of an action each TCA gets, which asks for the mean of what the gait
+            does; None where each has its own.
     """
     env: Any = model.get_env()
     memory: Any = model.replay_buffer  # type: ignore[attr-defined]
@@ -51,6 +53,8 @@ def demonstrate(
         actions = np.stack([
             _asked(task, gaits[i], phase[i], pace[i]) for i, task in enumerate(tasks)
         ])  # fmt: skip
+        if pairs is not None:
+            actions = np.stack([actions[:, pairs == k].mean(axis=1) for k in np.unique(pairs)], 1)
         actions += _NOISE * random.standard_normal(actions.shape)
         actions = np.clip(actions, -1.0, 1.0).astype(np.float32)
         after, rewards, dones, infos = env.step(actions)

@@ -23,32 +23,42 @@ Observations = NDArray[np.float32]
 class LearningEnv(VecEnvWrapper):
     """Several tasks, and statistics of their episodes.
 
-    With ``gait`` an action is a correction of the temperatures of a gait, 1 being ``bound``, and
-    an observation ends with sine and cosine of the gait's phase: what is learned is the network of
-    a ``tca_mj.agents.policies.files.ResidualPolicy``.
+    With ``alike`` an action has a number for each pair of a left and a right TCA. With ``gait`` an
+    action is a correction of the temperatures of a gait, 1 being ``bound``, and an observation ends
+    with sine and cosine of the gait's phase: what is learned is the network of a
+    ``tca_mj.agents.policies.files.ResidualPolicy``.
 
     Attributes:
         finished: For every episode that ended since it was last emptied: ``return``, ``length``,
             ``success``, ``early_end``, each reward term, and ``speed`` [m/s] where there is one.
+        pairs: Which number of an action each TCA gets; None where each has its own.
+        level: Reward of a step that is told to the learner as none.
     """
 
     venv: TaskVecEnv
 
     def __init__(
-        self, venv: TaskVecEnv, gait: tuple[Gait, tuple[float, ...]] | None = None, bound: float = 0
-    ) -> None:
+        self, venv: TaskVecEnv, gait: tuple[Gait, tuple[float, ...]] | None = None,
+        bound: float = 0, alike: bool = False,
+    ) -> None:  # fmt: skip
         """Wraps ``venv``.
 
         Args:
             venv: The tasks.
             gait: The gait that is corrected, and its steering per leg [K/rad]; None for none.
             bound: Largest correction [K].
+            alike: Whether left and right are told the same.
         """
         seen: Any = venv.observation_space
         if gait is not None:
             low, high = np.append(seen.low, [-1.0, -1.0]), np.append(seen.high, [1.0, 1.0])
             seen = spaces.Box(low.astype(np.float32), high.astype(np.float32), dtype=np.float32)
-        super().__init__(venv, observation_space=seen)
+        self.pairs = venv.tasks.envs[0].action.pairs if alike else None
+        acts: Any = venv.action_space
+        if self.pairs is not None:
+            acts = spaces.Box(-1.0, 1.0, (int(self.pairs.max()) + 1,), np.float32)
+        super().__init__(venv, observation_space=seen, action_space=acts)
+        self.level = 0.0
         self.finished: list[dict[str, float]] = []
         self._walkers: list[GaitPolicy] = []
         if gait is not None:
@@ -65,7 +75,9 @@ class LearningEnv(VecEnvWrapper):
         return self._with_clocks(self.venv.reset())
 
     def step_async(self, actions: NDArray[np.float32]) -> None:
-        """Turns corrections into actions."""
+        """Turns corrections, or what both sides are told, into actions."""
+        if self.pairs is not None:
+            actions = actions[:, self.pairs]
         if self._walkers:
             changes = self._bound * actions.astype(np.float64)
             each = zip(self._walkers, self._seen, changes, strict=True)
@@ -91,7 +103,7 @@ class LearningEnv(VecEnvWrapper):
                 last = info["terminal_observation"]
                 info["terminal_observation"] = with_clock(last, self._walkers[i])
                 self._walkers[i].reset()
-        return self._with_clocks(observations), rewards, dones, infos
+        return self._with_clocks(observations), rewards - np.float32(self.level), dones, infos
 
     def _with_clocks(self, observations: Any) -> Observations:
         if not self._walkers:
@@ -102,7 +114,8 @@ class LearningEnv(VecEnvWrapper):
 
     def state(self) -> dict[str, Any]:
         """All there is to it, to be given to ``restore``."""
-        kept = {name: getattr(self, name) for name in ("finished", "_walkers", "_seen", "_sums")}
+        names = ("finished", "_walkers", "_seen", "_sums", "level")
+        kept = {name: getattr(self, name) for name in names}
         return {"venv": pickle.dumps(self.venv), "kept": pickle.dumps(kept)}
 
     def restore(self, state: Mapping[str, Any]) -> None:

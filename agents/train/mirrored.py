@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,7 @@ from stable_baselines3.common.buffers import ReplayBuffer
 from stable_baselines3.common.type_aliases import ReplayBufferSamples
 
 from tca_mj.agents.train.sb3_env import TaskVecEnv
-from tca_mj.envs.table import Table
+from tca_mj.envs.table import Entry, Table
 
 _RETOLD = 5  # all but one in so many are told anew
 
@@ -102,7 +103,7 @@ class MirroredReplayBuffer(ReplayBuffer):
 
 
 def mirrored_memory(
-    tasks: TaskVecEnv, *, retold: bool = False, seed: int = 0
+    tasks: TaskVecEnv, *, retold: bool = False, alike: bool = False, seed: int = 0
 ) -> dict[str, Any]:
     """Arguments of an off-policy learner of Stable-Baselines3 whose memories are mirrored.
 
@@ -111,6 +112,8 @@ def mirrored_memory(
     Args:
         tasks: What it learns in, with scaled observations: running statistics know no mirror.
         retold: Whether memories are also told with other commands.
+        alike: Whether actions have a number for each pair of a left and a right one, which are
+            then told the same.
         seed: Seed of those commands.
 
     Raises:
@@ -122,13 +125,17 @@ def mirrored_memory(
     for name, table in (("observation", task.observation), ("action", task.action)):
         if not table.symmetric:
             raise ValueError(f"tasks must know a mirror, got none in the table of its {name}")
+    action = task.action
+    if alike:
+        one = Entry("alike", int(action.pairs.max()) + 1, -1.0, 1.0, "-")
+        action = Table([replace(one, mirror=tuple(range(1, one.size + 1)))])
     retelling = getattr(task, "retelling", None)
     if retold and retelling is None:
         raise ValueError("tasks must follow commands to be told others, got a task without")
     return {
         "replay_buffer_class": MirroredReplayBuffer,
         "replay_buffer_kwargs": {
-            "observation": task.observation, "action": task.action,
+            "observation": task.observation, "action": action,
             "retelling": retelling if retold else None, "seed": seed,
         },
     }  # fmt: skip
