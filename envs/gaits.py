@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -107,20 +108,30 @@ def told(now: Following, rotation: NDArray[np.float64], fastest: float) -> dict[
     }
 
 
-# After how many decisions it was learned, and whose steps come first: the script's crawl moves all
-# legs together, and so would the learner.
-_LEARNED = {"crawl": (6000, "trot"), "walk": (15_000, "scripted"), "shimmy": (16_000, "scripted")}
+# After how many decisions it was learned, whose steps come first, and what else differs. The
+# script's crawl moves all legs together, and so would the learner. On a beam left and right do the
+# same: told so, half as many numbers are to be found, and what each is worth is seen the sooner.
+_LEARNED: dict[str, tuple[int, str, dict[str, Any]]] = {
+    "crawl": (6000, "trot", {}),
+    "walk": (15_000, "scripted", {}),
+    "shimmy": (12_000, "tetrapod-shimmy", {
+        "options": {"randomise": 0.1}, "alike": True, "centred": True, "discount": 0.95,
+        "interval": 2000,
+        "learner": {**HELD, "learning_starts": 3000, "gradient_steps": 6,
+                    "ent_coef": "auto_0.02"},
+    }),
+}  # fmt: skip
 RECIPES = {
     gait: {
         "sac": Recipe.held(
-            steps, 0.4, timestep=10e-3, options={"randomise": 0.2}, mirrored=True,
-            growth={"wander": 10_000}, start=first,
+            steps, 0.4, start=first, timestep=10e-3, mirrored=True, growth={"wander": 10_000},
             # All directions at once take a larger network, and from chance.
             grown={"steps": 32_000, "start": "random",
                    "learner": {**HELD, "hidden": (256, 256)}},
+            **{"options": {"randomise": 0.2}, **more},
         ),
     }
-    for gait, (steps, first) in _LEARNED.items()
+    for gait, (steps, first, more) in _LEARNED.items()
 }  # fmt: skip
 """By gait and algorithm."""
 
