@@ -1,9 +1,12 @@
 """``TCA/TetrapodCourse-v0`` and its scripted controller."""
 
 import hashlib
+import json
 import pickle
+import runpy
 import warnings
 from dataclasses import asdict, replace
+from pathlib import Path
 
 import gymnasium as gym
 import numpy as np
@@ -405,3 +408,17 @@ def test_the_quick_course_is_walked_by_name(name):
     summary = play("TCA/TetrapodCourse-v0", policy, seed=0, max_duration=1.0, progress=False)
     assert summary["ending"] == "stopped after 1 s"
     assert summary["phases"][0]["name"] == "crawl"
+
+
+def test_the_page_has_the_figures_that_were_kept(tmp_path, monkeypatch):
+    """After a change: python scripts/course_table.py --page."""
+    script = runpy.run_path(str(Path(__file__).parent.parent / "scripts" / "course_table.py"))
+    page = tmp_path / "course.md"
+    page.write_text(script["PAGE"].read_text(encoding="utf-8"), encoding="utf-8")
+    kept = json.loads(script["DATA"].read_text(encoding="utf-8"))
+    monkeypatch.setitem(script["write_page"].__globals__, "PAGE", page)
+    script["write_page"](kept)
+    assert page.read_text(encoding="utf-8") == script["PAGE"].read_text(encoding="utf-8")
+    rows = kept["specialists"]
+    assert len(rows) == 10 and sum(not row["ending"] for row in rows) == 9
+    assert not any(row["harmed"] for each in kept.values() for row in each)
