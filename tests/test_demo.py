@@ -93,7 +93,10 @@ def test_the_scripted_agent_for_a_moment(tmp_path: Path) -> None:
     for quantity in ("energy", "peak_temperature", "peak_tension"):
         assert list(result[quantity]) == TCAS
     assert result["energy"]["arm.wrist.tca"] > 1.0  # the board lies askew: the wrist turns first
-    assert result["peak_temperature"]["arm.gripper.tca"] == 25.0
+    # Wrist and gripper turn and open at once; what bends is warmed by 20 K/s, and aligns.
+    peaks = result["peak_temperature"]
+    assert min(peaks["arm.wrist.tca"], peaks["arm.gripper.tca"]) > 50.0
+    assert max(peaks[f"arm.bending.tca{i}"] for i in range(3)) < 45.0
     assert result["real_time_factor"] > 0.1
     assert set(result["wall"]) >= {"simulation", "recording", "plot"}
     assert {"python", "tca-mj", "mujoco", "gymnasium", "numpy", "rerun-sdk"} == set(

@@ -107,7 +107,7 @@ def resistance(
         short = ONE - length / wire.rest_length
         left = np.where(short < ZERO, wire.stretch, wire.contraction) * short + ONE
     good = np.minimum(length, left) > ZERO
-    good &= np.isfinite(temperature)
+    good = good & np.isfinite(temperature)
     if not every(good):
         if strict:
             within("temperature", temperature)
