@@ -152,10 +152,13 @@ def main() -> int:
         if unknown:
             parser.error(f"checks must be among {', '.join(CHECKS)}, got {', '.join(unknown)}")
         kept = OUT / "results.json"
-        results = json.loads(kept.read_text(encoding="utf-8")) if kept.exists() else {}
+        results: dict[str, Any] = {}
         names = asked.checks or list(CHECKS)
         for name in names:
-            results[name] = tried(name)
+            found = tried(name)
+            # Read anew: another call may have tried other checks meanwhile.
+            results = json.loads(kept.read_text(encoding="utf-8")) if kept.exists() else {}
+            results[name] = found
             write_whole(kept, json.dumps(results, indent=1).encode())
             head = PAGE.read_text(encoding="utf-8").partition(MARK)[0]
             write_whole(PAGE, f"{head}{written(results)}".encode())
