@@ -220,6 +220,10 @@ def test_a_load_comes_back_to_the_mean_that_is_believed(bank):
     tension, scatter = observer.tension(estimate)
     assert tension == pytest.approx([WEIGHT], rel=1e-6)
     assert scatter == pytest.approx([0.1 / np.sqrt(2.0 * np.pi)], rel=1e-3)
+    assert estimate.deviation[4, 0] == 0.0
+    wanders = TcaObserver(bank, replace(observer.spec, mean_rate=0.02))
+    later = wanders.predicted(estimate, 8.0, 0.25)
+    assert later.deviation[4, 0] == pytest.approx(0.01)
 
 
 @pytest.mark.parametrize("bandwidth", [0.0, 1.0])
