@@ -56,7 +56,8 @@ def main(argv: list[str] | None = None) -> None:
         if phase not in frames and policy.since >= MOMENTS.get(phase, np.inf):
             frames[phase] = draw(env, view(0.215, 108.0, 0.075, -10.0), 400, 480)
         if (phase, round(policy.since, 1)) == HERO:
-            hero = draw(env, view(0.15, 48.0, 0.05, -12.0), 1280, 960)
+            # From where the screwdriver, which the wrist keeps turned, is seen from its side.
+            hero = draw(env, view(0.15, 14.0, 0.05, -12.0), 1280, 960)
             imageio.imwrite(args.out / "arm.png", hero)
         observation, _, terminated, truncated, _ = env.step(action)
         ended = terminated or truncated
