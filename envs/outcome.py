@@ -123,6 +123,8 @@ def harm(sim: Simulation, hottest: float, hottest_spine: float) -> str | None:
     if some(burnt):
         name = sim.spines.names[int(np.argmax(burnt))]
         return f"overheated: {name} above {hottest_spine} °C"
+    if not sim.breakable:
+        return None
     torn = sim.tension > sim.bank.breaking_force
     if some(torn):
         i = int(np.argmax(torn))

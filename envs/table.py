@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from array import array as singles
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -216,8 +217,7 @@ class Table:
             if len(each) != size:
                 raise ValueError(f"{name} must have {size} numbers, got {len(each)}")
             flat += each
-        with np.errstate(over="ignore"):  # what diverged is infinite, and so out of bounds
-            return np.array(flat, dtype=np.float32)
+        return np.array(singles("f", flat))  # what diverged is infinite there, and so out of bounds
 
     def read(self, array: NDArray[Any]) -> dict[str, NDArray[Any]]:
         """The rows of an array of shape (..., size), by name."""

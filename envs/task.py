@@ -15,7 +15,7 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tca_mj.checks import door, quantity, require_one_of, shown, whole
+from tca_mj.checks import door, quantity, require_one_of, shown, some, whole
 from tca_mj.drive import Drive, SimulationDiverged, Timestep
 from tca_mj.envs.options import Option, Options, Setup, variation_of, variation_options
 from tca_mj.envs.outcome import (
@@ -513,7 +513,8 @@ class SimulatedTask(gym.Env[Observation, Action], ABC):
             for name, value in verdict.seen.items():
                 observation[table.slices[name]] = value
             if math.isfinite(self.hot_temperature):
-                excess = float(np.maximum(sim.temperature - self.hot_temperature, 0.0).sum())
+                above = sim.temperature - self.hot_temperature
+                excess = float(np.maximum(above, 0.0).sum()) if some(above > 0.0) else 0.0
                 if self.heat_price:
                     terms["heat"] = -self.heat_price * self.share * excess
                 if self.hot_temperature < self.max_temperature:

@@ -261,10 +261,6 @@ class MixedBank:
             ]
         )
 
-    def pulls(self, states: Sequence[MixedState], length: Array) -> list[Pull]:
-        """``pull`` of several states at one length."""
-        return [self.pull(state, length) for state in states]
-
     def resistance(self, state: MixedState, length: Array, *, strict: bool = True) -> Array:
         """Resistance of the TCAs, not a number for other kinds, shape (..., n) [ohm]."""
         found = [

@@ -127,7 +127,7 @@ def within(
     least, most = max(at_least, -LARGEST), min(at_most, LARGEST)
     if array.size <= _FEW:
         good = True
-        for one in array.ravel().tolist():
+        for one in (array if array.ndim == 1 else array.ravel()).tolist():
             good &= above < one >= least and below > one <= most
     else:
         low = array > above if above >= least else array >= least

@@ -94,9 +94,12 @@ def advance(
         later, pull = bank.advance(tca, inputs.command, length, period)
         return later, Pull(pull.tension * gain, pull.stiffness * gain, length)
     later = bank.warmed(tca, inputs.command, length, period)
-    before, pull = bank.pulls((tca, later), length)
-    tension, rise = pull.tension * gain, (pull.tension - before.tension) / period * gain
-    spines.advance(inputs.voltage, inputs.fan, motion, tension, rise, period)
+    pull = bank.pull(later, length)
+    tension = pull.tension * gain
+    modulus = spines.advance(inputs.voltage, inputs.fan, motion, period)
+    if spines.resist(modulus, tension):
+        rise = (pull.tension - bank.pull(tca, length).tension) / period * gain
+        spines.judge(modulus, tension, rise)
     return later, Pull(tension, pull.stiffness * gain, length)
 
 

@@ -96,6 +96,7 @@ class Simulation:
         spines: The shape-memory spines, if there are any.
         chains: Its chains by name.
         gain: Factor of every tension over the TCAs' law, see ``tca_mj.variation``.
+        breakable: Whether it is known of a TCA when it breaks.
         haste: Smaller steps while something snaps, or None.
 
     Example:
@@ -172,6 +173,7 @@ class Simulation:
         self.substeps = substeps
         self._run = max(_RUN, _RUN_BY_FREEDOM // max(self.model.nv, 1))
         self._lasting = math.nan, 0  # a duration, and how many updates it takes
+        self.breakable = bool(np.isfinite(self.bank.breaking_force).any())
         self.gain = 1.0
 
         model = self.model
@@ -585,8 +587,8 @@ class Simulation:
 
     def _check(self) -> None:
         data = self.data
-        number, q, v = data.warning.number.tolist(), data.qpos, data.qvel
-        if not any(number) and math.isfinite(q.dot(q) + v.dot(v)):
+        number, q, v = data.warning.number, data.qpos, data.qvel
+        if number.tobytes() == _NO_WARNING and math.isfinite(q.dot(q) + v.dot(v)):
             return
         bad = [name for warning, name in DIVERGENCE.items() if number[warning]]
         if bad or not (every(np.isfinite(q)) and every(np.isfinite(v))):

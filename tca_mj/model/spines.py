@@ -14,7 +14,7 @@ from tca_mj.model.spine import RoutedSpine
 from tca_mj.model.sums import Total, rows
 from tca_mj.smp import DamageSpec, SpineBank, SpinesState
 from tca_mj.smp.damage import damaging
-from tca_mj.tca.arrays import row, stacked
+from tca_mj.tca.arrays import frozen, row, stacked
 
 
 class Spines:
@@ -69,6 +69,7 @@ class Spines:
         self._joint = np.searchsorted(owner, spine)
         self._pair = np.searchsorted(spine, np.arange(self.n))
         self._damage = DamageSpec.of(self.bank.smp)
+        self._slack, self._soft = frozen(self._damage.slack), frozen(self._damage.soft_modulus)
         self._body = body
         stiffness, rest, damping = body.stiffness.copy(), body.rest.copy(), body.damping.copy()
         # What the cells have without spines: stiffness, moment at angle 0, damping. Where nothing
@@ -157,27 +158,44 @@ class Spines:
         return volts + self._off, blown | self._still
 
     def advance(
-        self, voltage: Array, fan: NDArray[np.bool_], motion: Array, tension: Array,
-        tension_rate: Array, dt: float,
-    ) -> None:  # fmt: skip
+        self, voltage: Array, fan: NDArray[np.bool_], motion: Array, dt: float
+    ) -> Array:
         """Heats the spines for ``dt`` and sets the springs of their cells.
 
         Args:
             voltage: Voltages of the heaters, shape (..., n) [V].
             fan: Whether air is blown at them, shape (..., n).
             motion: Present motion of all cells, shape (..., 4, cells) [m, rad].
-            tension: Tensions of all TCAs, on the last axis [N].
-            tension_rate: Their change at constant length [N/s].
             dt: Length of the step [s].
+
+        Returns:
+            Modulus of the spine at each of its pairs with a TCA, shape (..., pairs) [Pa].
         """
         assert self.state is not None
         self.voltage = voltage
         state = self.state = self.bank.advance(self.state, voltage, fan, self._angles(motion), dt)
-        modulus = self._stiffen(state)
-        if not some(tension > self._damage.slack):
-            return
+        return self._stiffen(state).take(self._joint, axis=-1)
+
+    def resist(self, modulus: Array, tension: Array) -> bool:
+        """Whether a taut TCA pulls at a stiff spine, which one that contracts would damage.
+
+        Args:
+            modulus: What ``advance`` returns.
+            tension: Tensions of all TCAs, on the last axis [N].
+        """
+        taut = tension > self._slack
+        return some(taut) and some((modulus > self._soft) & taut.take(self._tca, axis=-1))
+
+    def judge(self, modulus: Array, tension: Array, tension_rate: Array) -> None:
+        """Notes which spines a TCA is damaged by; what is rising at constant length contracts.
+
+        Args:
+            modulus: What ``advance`` returns.
+            tension: Tensions of all TCAs, on the last axis [N].
+            tension_rate: Their change at constant length [N/s].
+        """
         harmed = damaging(
-            modulus.take(self._joint, axis=-1), tension.take(self._tca, axis=-1),
+            modulus, tension.take(self._tca, axis=-1),
             self._rate * tension_rate.take(self._tca, axis=-1), self._damage,
         )  # fmt: skip
         if some(harmed):

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -173,12 +172,10 @@ class TcaBank:
             law = "rod"
         self.law = law
         self.creep = None if creep is None else CreepBank(self.specs, creep)
-        self._law = partial(law_of, law=law if callable(law) else _LAWS[law])
-        self._coils = self._law(self.specs)
+        self._coils = law_of(self.specs, law=law if callable(law) else _LAWS[law])
         for name in ("shortest", "longest", "tension"):
             if not hasattr(self._coils, name):
                 raise ValueError(f"law must make a TensionLaw with {name}, got {shown(law)}")
-        self._several: dict[int, tuple[TensionLaw, list[Any]]] = {}
         self._wire = WireTable.of(self.specs)
         self.heat = heat_of(self.specs)
         self.supply = Supply()
@@ -265,27 +262,12 @@ class TcaBank:
                 heat leaves no modulus.
             CoilSolveError: If the shape of a coil is not found.
         """
-        return self.pulls((state,), length)[0]
-
-    def pulls(self, states: Sequence[TcaState], length: ArrayLike) -> list[Pull]:
-        """``pull`` of several states at one length, all at once."""
-        k = len(states)
-        if k not in self._several:  # as TCAs side by side
-            parts = [np.s_[..., i * self.n : (i + 1) * self.n] for i in range(k)]
-            self._several[k] = self._law(k * self.specs) if k > 1 else self._coils, parts
-        length = self._checked(states[0], "length", length)
-        temperature, lengths = states[0].temperature, length
-        if k > 1:
-            temperature = np.concatenate([state.temperature for state in states], axis=-1)
-            lengths = np.concatenate(k * [length], axis=-1)
-        law, parts = self._several[k]
+        length = self._checked(state, "length", length)
+        law = self._coils
         if self.creep is not None:
             assert isinstance(law, CoilRods)
-            law = self.creep.law(law, np.concatenate([_shift(s) for s in states], axis=-1), k)
-        tension, stiffness = law.tension(lengths, temperature)
-        if k == 1:
-            return [Pull(tension, stiffness, length)]
-        return [Pull(tension[part], stiffness[part], length) for part in parts]
+            law = self.creep.law(law, _shift(state))
+        return Pull(*law.tension(length, state.temperature), length)
 
     def advance(
         self, state: TcaState, command: ArrayLike, length: ArrayLike, dt: float

@@ -208,10 +208,9 @@ class CreepBank:
             state = self.step(state, tension, cold, cold_time)
         return state
 
-    def law(self, rods: CoilRods, shift: Array, times: int = 1) -> CoilRods:
-        """The law of these TCAs, so many side by side, at shifts (..., times n) [m]; unchecked."""
-        rest, fibre = np.tile(self._rest, times), np.tile(self._fibre_length, times)
-        return rods.crept((rest + shift) / fibre)
+    def law(self, rods: CoilRods, shift: Array) -> CoilRods:
+        """The law of these TCAs at shifts of their natural lengths, (..., n) [m]; unchecked."""
+        return rods.crept((self._rest + shift) / self._fibre_length)
 
     @door
     def crept(self, state: CreepState) -> tuple[TcaSpec, ...]:

@@ -55,12 +55,14 @@ class WireTable(NamedTuple):
         rest_resistance: Resistance R_0 at the natural length [ohm].
         stretch: Relative fall of the resistance per unit strain beyond it [1].
         contraction: Relative rise of the resistance per unit contraction below it [1].
+        each: The four of each TCA, as numbers.
     """
 
     rest_length: Array
     rest_resistance: Array
     stretch: Array
     contraction: Array
+    each: list[list[float]]
 
     @classmethod
     @door
@@ -72,10 +74,11 @@ class WireTable(NamedTuple):
         """
         rest_length, cos = column(specs, "rest_length"), np.cos(column(specs, "lay_angle"))
         strand = column(specs, "resistance_per_length") / (cos * column(specs, "strands"))
-        return cls(
+        columns = (
             rest_length, rest_length * strand, cos * cos * column(specs, "stretch_resistance"),
             cos * cos * column(specs, "contraction_resistance"),
         )  # fmt: skip
+        return cls(*columns, np.array(columns).T.tolist())
 
 
 def resistance(
@@ -119,9 +122,8 @@ def resistance(
 
 def _one_by_one(wire: WireTable, length: Array, temperature: Array) -> Array | None:
     """Resistance of few TCAs, to the bit; None if one has none."""
-    found = []
-    columns = [column.tolist() for column in (length, temperature, *wire)]
-    for long, warm, rest, ohms, stretch, contraction in zip(*columns, strict=True):
+    found, rows = [], zip(length.tolist(), temperature.tolist(), wire.each, strict=True)
+    for long, warm, (rest, ohms, stretch, contraction) in rows:
         short = 1.0 - long / rest
         left = (stretch if short < 0.0 else contraction) * short + 1.0
         if not (long > 0.0 and left > 0.0 and math.isfinite(warm)):
