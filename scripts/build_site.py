@@ -18,6 +18,7 @@ from pathlib import Path
 from notebooks import write_notebook
 
 from tca_mj.files import write_whole
+from tca_mj.pages import command_line
 
 ROOT = Path(__file__).resolve().parent.parent
 FENCE = re.compile(r"(^```.*?^```\n)", re.MULTILINE | re.DOTALL)
@@ -187,7 +188,9 @@ def build(pages: Path, out: Path) -> int:
 
 
 def main() -> int:
-    out = Path(sys.argv[1] if sys.argv[1:] else ROOT / "build" / "site").resolve()
+    parser = command_line(__doc__)
+    parser.add_argument("folder", type=Path, nargs="?", default=ROOT / "build" / "site")
+    out = parser.parse_args().folder.resolve()
     pages = out.with_name(f"{out.name}-pages")
     for folder in (pages, out):
         shutil.rmtree(folder, ignore_errors=True)

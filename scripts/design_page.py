@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from tca_mj.files import write_whole
-from tca_mj.pages import page, picture, table
+from tca_mj.pages import command_line, page, picture, table
 from tca_mj.tca.design import Designs, NoDesign, Wish, find_designs, lifted, report
 from tca_mj.validation.designs import designs_picture
 
@@ -80,6 +80,7 @@ def seeds() -> str:
 
 def main() -> None:
     """Writes both."""
+    command_line(__doc__).parse_args()
     found = find_designs(WISH)
     designs_picture(found, PICTURE)
     caption = (
