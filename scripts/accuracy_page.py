@@ -12,6 +12,7 @@ import tempfile
 from pathlib import Path
 
 from tca_mj.certify.report import certify
+from tca_mj.pages import command_line
 
 HERE = Path(__file__).resolve()
 DOCS = HERE.parents[1] / "docs"
@@ -19,6 +20,7 @@ MARKER = "<!-- Written by scripts/accuracy_page.py from here on. -->\n"
 
 
 def main() -> None:
+    command_line(__doc__).parse_args()
     page = DOCS / "accuracy.md"
     introduction, marker, _ = page.read_text(encoding="utf-8").partition(MARKER)
     if not marker:

@@ -7,7 +7,6 @@
 The table of loads that vary in bandwidth is that of scripts/load_bandwidth.py.
 """
 
-import sys
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cache
@@ -18,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tca_mj.control import TcaServo, goal_temperature, pi_rest, pi_step
-from tca_mj.pages import folder_of_pictures, table, write_between
+from tca_mj.pages import command_line, table, write_between
 from tca_mj.tca import (
     CoilSurfaces,
     CurrentSensor,
@@ -538,11 +537,17 @@ TABLES = {"observer": observer_table, "observability": observability_table,
 
 
 def main() -> None:
-    if "--page" in sys.argv[1:]:
+    parser = command_line(__doc__)
+    parser.add_argument("--out", type=Path, default=Path("docs/pictures"))
+    parser.add_argument("--tables", action="store_true", help="print the tables, draw nothing")
+    parser.add_argument("--page", action="store_true", help="write the tables into docs/bench.md")
+    asked = parser.parse_args()
+    if asked.page:
         for name, lines in TABLES.items():
             write_between(Path("docs/bench.md"), f"scripts/bench_page.py: {name}", lines())
-    elif (out := folder_of_pictures(__doc__, Path("docs/pictures"))) is not None:
-        pictures(out)
+    elif not asked.tables:
+        asked.out.mkdir(parents=True, exist_ok=True)
+        pictures(asked.out)
     else:
         for lines in TABLES.values():
             print("\n".join(lines()), flush=True, end="\n\n")

@@ -18,16 +18,19 @@ from pathlib import Path
 from notebooks import write_notebook
 
 from tca_mj.files import write_whole
+from tca_mj.pages import command_line
 
 ROOT = Path(__file__).resolve().parent.parent
 FENCE = re.compile(r"(^```.*?^```\n)", re.MULTILINE | re.DOTALL)
 LINK = re.compile(r"(\]\()([^)#:\s]+)(#[^)\s]*)?(?=\))")
+NAMED = re.compile(r"\[[\w/-]+\.md(?=\]\(([^)#:\s]+\.md)(?:#([^)\s]*))?\))")  # by its file's name
 OUTSIDE = {"README.md": "overview", "CONTRIBUTING.md": "contributing", "CHANGELOG.md": "changelog"}
 SETTINGS = {
     "project": "tca-mj", "html_title": "tca-mj", "language": "en", "extensions": ["myst_parser"],
     "root_doc": "index", "myst_heading_anchors": 4, "smartquotes": False,
     "html_theme": "furo", "html_copy_source": False, "html_show_sphinx": False,
-    "html_use_index": False, "html_extra_path": ["replays"],
+    "html_show_copyright": False, "html_use_index": False, "html_extra_path": ["replays"],
+    "html_static_path": [str(ROOT / "scripts" / "site.css")], "html_css_files": ["site.css"],
     "html_show_search_summary": False,  # it would fetch the pages, which no browser does from files
 }  # fmt: skip
 # What is replayed, by page: title, task, policy, what is left out and shown [s], and speed.
@@ -74,8 +77,27 @@ def gather(path: str, pages: Path) -> str:
         near = os.path.relpath(place(target), Path(place(path)).parent)
         return f"{link[1]}{near}{link[3] or ''}"
 
+    def called(link: re.Match[str]) -> str:
+        return f"[{heading(os.path.normpath(Path(path).parent / link[1]), link[2])}"
+
     parts = FENCE.split((ROOT / path).read_text(encoding="utf-8"))
-    return "".join(part if i % 2 else LINK.sub(moved, part) for i, part in enumerate(parts))
+    return "".join(
+        part if i % 2 else LINK.sub(moved, NAMED.sub(called, part)) for i, part in enumerate(parts)
+    )
+
+
+def heading(path: str, section: str | None) -> str:
+    """What a page, or a section of it, is called.
+
+    Args:
+        path: The page, from the root of the project.
+        section: What a link to it has behind the ``#``; None for the page.
+    """
+    text = FENCE.sub("", (ROOT / path).read_text(encoding="utf-8"))
+    for title in re.findall(r"^#+ +(.+?) *$", text, re.MULTILINE):
+        if section in (None, re.sub(r"[^\w\- ]", "", title.lower()).replace(" ", "-")):
+            return str(title)
+    return path  # the building ends there: the link leads nowhere
 
 
 def toctree(names: Iterable[str], caption: str = "") -> str:
@@ -187,7 +209,9 @@ def build(pages: Path, out: Path) -> int:
 
 
 def main() -> int:
-    out = Path(sys.argv[1] if sys.argv[1:] else ROOT / "build" / "site").resolve()
+    parser = command_line(__doc__)
+    parser.add_argument("folder", type=Path, nargs="?", default=ROOT / "build" / "site")
+    out = parser.parse_args().folder.resolve()
     pages = out.with_name(f"{out.name}-pages")
     for folder in (pages, out):
         shutil.rmtree(folder, ignore_errors=True)

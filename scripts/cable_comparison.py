@@ -29,6 +29,7 @@ from tca_mj.machine import machine
 from tca_mj.model import settle
 from tca_mj.model.chain import add_chain
 from tca_mj.model.part import new_spec
+from tca_mj.pages import command_line
 
 NODES = (4, 8, 16, 32)
 LIGHT = 1e-4  # damping time where stability is measured [s]
@@ -146,6 +147,7 @@ def limits(nodes: int = 16) -> str:
 
 
 def main() -> None:
+    command_line(__doc__).parse_args()
     where = machine()
     print(f"MuJoCo {mujoco.__version__}, {where['cpu']}, one core\n")
     if cable(4, timestep=1e-3, damping=1e-6) is None:

@@ -6,9 +6,9 @@
 Times are of the processor, and what was compiled before is not in them.
 """
 
+import argparse
 import json
 import os
-import sys
 import time
 from typing import Any
 
@@ -176,7 +176,11 @@ def myosuite(case: dict[str, Any]) -> dict[str, Any]:
 def main() -> None:
     from importlib.metadata import version
 
-    name, path = sys.argv[1:]
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("name", choices=("pyelastica", "soromox", "myosuite"))
+    parser.add_argument("path", help="the cases, a JSON file")
+    asked = parser.parse_args()
+    name, path = asked.name, asked.path
     with open(path, encoding="utf-8") as file:
         case = json.load(file)[name]
     result = {"pyelastica": pyelastica, "soromox": soromox, "myosuite": myosuite}[name](case)

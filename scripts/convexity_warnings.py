@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from tca_mj.envs.tetrapod import TetrapodGait
 from tca_mj.model.mujoco_warnings import warning_counts
-from tca_mj.pages import table
+from tca_mj.pages import command_line, table
 
 EPISODES = 150
 STEP = mujoco.mj_step
@@ -101,6 +101,7 @@ def again(step: Warned, setting: Callable[[mujoco.MjModel], None]) -> tuple[Any,
 
 def main() -> None:
     """Prints the table."""
+    command_line(__doc__).parse_args()
     found, steps = warned_steps(SETTINGS["as it is"])
     exact = [again(step, change(tolerance=0.0, iterations=1000))[0] for step in found]
     rows = []

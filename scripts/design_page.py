@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from tca_mj.files import write_whole
-from tca_mj.pages import page, picture, table
+from tca_mj.pages import command_line, page, picture, table
 from tca_mj.tca.design import Designs, NoDesign, Wish, find_designs, lifted, report
 from tca_mj.validation.designs import designs_picture
 
@@ -25,19 +25,19 @@ SUPPLIES = ((12.0, math.inf), (6.0, math.inf), (6.0, 3.0), (6.0, 1.0), (3.0, 1.0
 
 def example(found: Designs) -> str:
     """What the command prints, a level further down."""
-    return report(found, 6).replace("\n## ", "\n### ").partition("\n")[2].strip()
+    return report(found).replace("\n## ", "\n### ").partition("\n")[2].strip()
 
 
 def checked(found: Designs) -> str:
     """How far the integrals are from steps through time, in words."""
     worst = 0.0
-    for i in found.spread(6):
+    for i in found.spread(8):
         each = found.front[i]
         lift = lifted(found.wish, each, dt=float(each.figures.time) / 1000)
         top = int(lift.contraction.argmax())
         worst = max(worst, abs(lift.time[top] / float(each.figures.time) - 1.0))
     return (
-        "Stepped through time in a thousand steps (`lifted`), the six reach the stroke within"
+        "Stepped through time in a thousand steps (`lifted`), the eight reach the stroke within"
         f" {100.0 * worst:.1f} % of the time that the integral says."
     )
 
@@ -80,11 +80,12 @@ def seeds() -> str:
 
 def main() -> None:
     """Writes both."""
+    command_line(__doc__).parse_args()
     found = find_designs(WISH)
     designs_picture(found, PICTURE)
     caption = (
         "The front: energy, temperature, length as colour, numbers as in the table. Right: number 1"
-        " stepped through a lift and its return"
+        " stepped through a lift and its return."
     )
     head = PAGE.read_text(encoding="utf-8").partition(MARKER)[0]
     text = page(

@@ -13,6 +13,7 @@ from tca_mj.modules.continuum_leg import continuum_leg
 from tca_mj.modules.finger import finger_pair
 from tca_mj.modules.morphing import morphing_module
 from tca_mj.modules.twisting import twisting_module
+from tca_mj.pages import command_line
 from tca_mj.robots.arm import arm
 from tca_mj.robots.tetrapod import rigid_tetrapod, tetrapod
 
@@ -28,6 +29,7 @@ BUILDERS = {
 
 def main() -> None:
     """Writes the files."""
+    command_line(__doc__).parse_args()
     FOLDER.mkdir(exist_ok=True)
     for name, builder in BUILDERS.items():
         text = export(builder(), FOLDER / f"{name}.xml")

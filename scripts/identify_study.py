@@ -2,6 +2,7 @@
 
     python scripts/identify_study.py --out runs/identify     goes on where it was stopped
     python scripts/identify_study.py --out runs/identify --page
+    python scripts/identify_study.py --pictures              docs/pictures/own_muscle_*.png
 
 Every case is a TCA drawn by its own number as seed. A bench measures it with the errors of
 ``simulated_bench``; the fit starts at the thread of the catalogue, not at the truth, and knows the
@@ -154,8 +155,10 @@ def main() -> None:
     parser.add_argument("--cases", type=int, default=CASES)
     parser.add_argument("--first", type=int, default=0, help="seed of the first")
     parser.add_argument("--page", action="store_true", help="write the tables into the page")
-    parser.add_argument("--pictures", action="store_true", help="draw the page's pictures, too")
+    parser.add_argument("--pictures", action="store_true", help="draw the pictures, nothing else")
     asked = parser.parse_args()
+    if asked.pictures:
+        return draw_pictures()
     path = asked.out / "cases.jsonl"
     asked.out.mkdir(parents=True, exist_ok=True)
     lines = path.read_text().splitlines() if path.exists() else []
@@ -170,8 +173,6 @@ def main() -> None:
         print("\n".join(rows), end="\n\n")
         if asked.page:
             write_between(DOCS / "identification.md", mark, rows)
-    if asked.pictures:
-        draw_pictures()
 
 
 if __name__ == "__main__":

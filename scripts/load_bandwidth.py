@@ -11,7 +11,6 @@ told f and by how much it wanders, but not about which weight. The bound is that
 for who knows the same: ``TcaObserver.bound``.
 """
 
-import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -19,7 +18,7 @@ import numpy as np
 from scipy.stats import norm
 
 from tca_mj.checks import Array
-from tca_mj.pages import table, write_between
+from tca_mj.pages import command_line, table, write_between
 from tca_mj.tca import HeatStep, ObserverSpec, TcaBank, TcaObserver
 from tca_mj.validation.sensors import SENSED
 from tca_mj.validation.strokes import weight
@@ -119,7 +118,11 @@ def bandwidth_table() -> list[str]:
 
 def main() -> None:
     """Prints the table, or writes it into the page, between its marks."""
-    if "--others" in sys.argv[1:]:
+    parser = command_line(__doc__)
+    parser.add_argument("--page", action="store_true", help="write the table into docs/bench.md")
+    parser.add_argument("--others", action="store_true", help="other seeds, other bandwidths told")
+    asked = parser.parse_args()
+    if asked.others:
         case = list(CASES)[-1]
         others: list[dict[str, float]] = [{"seed": 11}, {"seed": 12}, {"seed": 13}, {"told": 0.3},
                                           {"told": 3.0}]  # fmt: skip
@@ -128,7 +131,7 @@ def main() -> None:
         return
     lines = bandwidth_table()
     print("\n".join(lines))
-    if "--page" in sys.argv[1:]:
+    if asked.page:
         write_between(PAGE, MARK, lines)
 
 

@@ -8,7 +8,6 @@ a default writes it anew, and the difference is what the release notes have to s
 """
 
 import inspect
-import sys
 from enum import Enum
 from importlib import import_module
 from pathlib import Path
@@ -19,6 +18,7 @@ from api_pages import PACKAGES
 
 from tca_mj.checks import shown
 from tca_mj.files import write_whole
+from tca_mj.pages import command_line
 from tca_mj.registry import TASKS
 
 PROMISED = (*PACKAGES, "tca_mj.testing")
@@ -97,8 +97,10 @@ def promised() -> list[str]:
 
 
 if __name__ == "__main__":
+    parser = command_line(__doc__)
+    parser.add_argument("--print", action="store_true", help="show it, write nothing")
     text = "\n".join(promised()) + "\n"
-    if "--print" in sys.argv[1:]:
+    if parser.parse_args().print:
         print(text, end="")
     else:
         write_whole(FILE, text.encode())

@@ -260,7 +260,7 @@ def catalogue_page() -> str:
     )  # fmt: skip
     return pages.page(
         "# The catalogue of TCAs", prose(sys.modules[tca_mj.TcaSpec.__module__]),
-        "How they were found, and which facts they give: [tca.md](tca.md).",
+        "How they were found, and which facts they give: [twisted-and-coiled actuators](tca.md).",
         pages.table(["field", *(f"`{name}`" for name in known), "unit", "what", "source"], lines),
     )  # fmt: skip
 

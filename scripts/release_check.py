@@ -49,6 +49,7 @@ CHECKS = {
     "tests": PYTEST,
     "long tests": f"{PYTEST} -m long",
     "tutorials": f"{PYTHON} scripts/tutorials.py",
+    "printed tables": f"{PYTHON} scripts/page_tables.py --check",
     "site": "make docs",
     "browser": "npm install --silent --prefix build/axe axe-core && "
                f"{PYTHON} -m pip install -q selenium && {PYTHON} scripts/audit_site.py",

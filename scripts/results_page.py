@@ -1,5 +1,7 @@
 """Evaluates every agent in every task and writes docs/results.md, with its data and its pictures.
 
+The table of docs/training.md on the policies that come with the package is written, too.
+
     python scripts/results_page.py                            what is missing, then the page
     python scripts/results_page.py --tasks TCA/BendReach-v0   of one task; the page of all there is
     python scripts/results_page.py --page                     the page alone, of what is there
@@ -22,12 +24,16 @@ from typing import Any
 from tca_mj.agents.evaluate import METRICS, Evaluation, cell, evaluate, figures
 from tca_mj.agents.finished import EPISODES, kept
 from tca_mj.agents.policies import SavedPolicy, shipped
+from tca_mj.pages import table as markdown
+from tca_mj.pages import write_between
 from tca_mj.registry import TASKS, find_task, task_class
 
 ROOT = Path(__file__).resolve().parent.parent
 PAGE, DATA = ROOT / "docs" / "results.md", ROOT / "docs" / "results.json"
 PICTURES = ROOT / "docs" / "pictures"
 COURSE = "TCA/TetrapodCourse-v0"
+TRAINING, MARK = ROOT / "docs" / "training.md", "scripts/results_page.py: shipped"
+GOALS = [task.id for task in TASKS if "Tetrapod" not in task.id]  # they are reached or not
 
 # The robot, and what it is called on the page. Chance and nobody act on the first alone.
 CONDITIONS: dict[str, dict[str, Any]] = {
@@ -213,6 +219,37 @@ def page(results: dict[str, dict[str, dict[str, Any]]]) -> str:
     return "\n".join(lines)
 
 
+def shipped_table(results: dict[str, dict[str, dict[str, Any]]]) -> list[str]:
+    """The policies that come with the package: how each was made, by its file, and what it does."""
+
+    def change(
+        task: str, name: str, figure: str, scale: float, digits: int, share: bool = False
+    ) -> str:
+        both = [results[task][who]["nominal"]["figures"] for who in ("scripted", name)]
+        if figure not in both[1]:
+            return ""
+        before, after = (scale * each[figure]["mean"] for each in both)
+        more = f" ({100.0 * (after / before - 1.0):+.0f} %)" if share else ""
+        return f"{before:.{digits}f} to {after:.{digits}f}{more}"
+
+    rows = []
+    for name, path in sorted(shipped().items()):
+        saved = SavedPolicy.read(path)
+        about = saved.origin
+        what = "steps" if about.algorithm == "cma" or saved.task in GOALS else "decisions"
+        success = change(saved.task, name, "success", 100.0, 0) if saved.task in GOALS else ""
+        duration = change(saved.task, name, "duration", 1.0, 1) if saved.task in GOALS else ""
+        rows.append([
+            f"`{name}`", f"`{about.command}`", f"{about.steps:,} {what}",
+            change(saved.task, name, "speed", 1e3, 2, share=True)
+            or f"success {success} %, in {duration} s",
+            change(saved.task, name, "energy_per_metre", 1e-3, 1),
+        ])  # fmt: skip
+    heads = ["policy", "made by", "taken at", "speed, scripted to learned [mm/s]",
+             "energy per metre [kJ/m]"]  # fmt: skip
+    return markdown(heads, rows)
+
+
 def main(argv: list[str] | None = None) -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     known = [task.id for task in TASKS]
@@ -243,6 +280,7 @@ def main(argv: list[str] | None = None) -> None:
         results.setdefault(task, {}).setdefault(policy, {})[condition] = entry
     DATA.write_text(json.dumps(results, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
     PAGE.write_text(page(results), encoding="utf-8")
+    write_between(TRAINING, MARK, shipped_table(results))
     print(f"{PAGE}\n{DATA}")
 
 

@@ -30,6 +30,7 @@ from tca_mj.agents.workers import Workers
 from tca_mj.envs.gaits import ACTION
 from tca_mj.envs.tetrapod import TetrapodGait
 from tca_mj.machine import machine, versions
+from tca_mj.pages import command_line
 from tca_mj.robots.tetrapod import LEGS
 
 STEPS = 600  # control steps, 60 s
@@ -252,6 +253,7 @@ def table(names: list[str], rows: dict[str, list[str]]) -> None:
 
 def main() -> None:
     """Prints machine, versions and the tables."""
+    command_line(__doc__).parse_args()
     print("; ".join(f"{key} {value}" for key, value in {**machine(), **versions()}.items()))
     costs = {gait: cost(gait) for gait in GAITS}
     drags = [(row, step) for row in HARD for step in (5e-4, 2.5e-4, 1.25e-4)]

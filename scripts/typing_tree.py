@@ -6,6 +6,7 @@ are told to look. The links follow new files inside a folder; run it again after
 folder directly under ``tca_mj``.
 """
 
+import argparse
 import shutil
 from pathlib import Path
 
@@ -36,4 +37,5 @@ def link_package(root: Path) -> Path:
 
 
 if __name__ == "__main__":
+    argparse.ArgumentParser(description=__doc__).parse_args()
     print(link_package(ROOT))

@@ -5,6 +5,7 @@ import shutil
 import tempfile
 from pathlib import Path
 
+from tca_mj.pages import command_line
 from tca_mj.validation.report import report, validate_tca
 
 DOCS = Path(__file__).parents[1] / "docs"
@@ -28,6 +29,7 @@ def written(text: str) -> dict[str, str]:
 
 
 def main() -> None:
+    command_line(__doc__).parse_args()
     with tempfile.TemporaryDirectory() as folder:
         result = validate_tca(Path(folder))
         for picture in Path(folder).glob("*.png"):

@@ -73,6 +73,17 @@ def write_result(
         write_whole(out / f"{name}{ending}", f"{content}\n".encode())
 
 
+def command_line(about: str | None) -> argparse.ArgumentParser:
+    """The options of a script, whose ``--help`` shows what it does as it stands there.
+
+    Args:
+        about: What the script does, its docstring.
+    """
+    return argparse.ArgumentParser(
+        description=about, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+
+
 def folder_of_pictures(about: str | None, usual: Path) -> Path | None:
     """Where a script puts its pictures, from its command line; None if it is to print its tables.
 
@@ -80,8 +91,8 @@ def folder_of_pictures(about: str | None, usual: Path) -> Path | None:
         about: What the script does.
         usual: The folder if none is given; it is made if it is missing.
     """
-    parser = argparse.ArgumentParser(description=about)
-    parser.add_argument("--out", type=Path, default=usual)
+    parser = command_line(about)
+    parser.add_argument("--out", type=Path, default=usual, help="where the pictures are put")
     parser.add_argument("--tables", action="store_true", help="print the tables, draw nothing")
     asked = parser.parse_args()
     if asked.tables:

@@ -26,6 +26,9 @@ def two_nodes(monkeypatch):
     pytest.importorskip("ray")
     monkeypatch.setenv("RAY_AUTH_MODE", "disabled")
     monkeypatch.setenv("RAY_USAGE_STATS_ENABLED", "0")
+    # Paths of sockets have at most 107 bytes, and that of the tests' own folder grows.
+    folder = tempfile.mkdtemp(prefix="two-", dir="/tmp")
+    monkeypatch.setenv("RAY_TMPDIR", folder)
     from ray.cluster_utils import Cluster
 
     nodes = Cluster(initialize_head=True,
@@ -35,7 +38,7 @@ def two_nodes(monkeypatch):
     yield nodes, second
     with suppress(Exception):  # one of them is not there any more
         nodes.shutdown()
-    shutil.rmtree(Path(tempfile.gettempdir()) / "ray", ignore_errors=True)
+    shutil.rmtree(folder, ignore_errors=True)
 
 
 @contextmanager

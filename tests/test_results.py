@@ -30,6 +30,8 @@ def test_the_page_is_what_its_script_makes_of_the_data():
     for task, found in RESULTS.items():
         assert "\n".join(script["table"](task, found)) in page
     assert script["INTRODUCTION"] in page
+    training = (ROOT / "docs" / "training.md").read_text(encoding="utf-8")
+    assert "\n".join(script["shipped_table"](RESULTS)) in training
     names = {name for shown in script["SHOWN"].values() for name in shown}
     assert names <= METRICS.keys()
 

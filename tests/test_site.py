@@ -87,6 +87,15 @@ def test_links_of_the_site_lead_to_pages_and_their_sections(site):
     assert lost == []
 
 
+def test_pages_of_the_site_are_called_by_their_titles(site):
+    """Not by the files of the checkout, which a reader of the site has not."""
+    for name, page in site[0].items():
+        assert re.findall(r">[\w/-]+\.md(?:</span>)?</a>", page.text) == [], name
+    text = site[0]["tutorial-muscle.html"].text
+    for title in ("How sure a fit is", "What to measure first"):  # a page, a section of one
+        assert re.search(rf"<a [^>]*>(<span [^>]*>)?{title}(</span>)?</a>", text), title
+
+
 def test_pages_of_the_site_can_be_heard(site):
     """A language, one title, headings that leave out no level, words for every picture; what
     scrolls can be reached without a mouse."""

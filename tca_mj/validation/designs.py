@@ -34,6 +34,8 @@ def designs_picture(found: Designs, path: Path) -> None:
 
 
 def _fill(figure: Any, found: Designs) -> None:
+    from matplotlib.patheffects import withStroke
+
     front, course = figure.subplots(1, 2, width_ratios=(1.15, 1.0))
     x, y, *more = found.aims
     colour = _values(found, more[0]) if more else _MOVED
@@ -44,7 +46,11 @@ def _fill(figure: Any, found: Designs) -> None:
     shown = found.spread(8)
     across, up = _values(found, x), _values(found, y)
     for number, i in enumerate(shown, 1):
-        front.annotate(str(number), (across[i], up[i]), xytext=(5, 4), textcoords="offset points")
+        text = front.annotate(
+            str(number), (across[i], up[i]), xytext=(5, 4), textcoords="offset points",
+            fontweight="bold", zorder=5,
+        )  # fmt: skip
+        text.set_path_effects([withStroke(linewidth=3, foreground="white")])
     best = found.chosen
     front.plot(across[best], up[best], "o", mfc="none", mec=_HEATED, ms=11, mew=1.6)
 

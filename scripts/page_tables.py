@@ -1,0 +1,123 @@
+"""Holds tables of the pages against the scripts that print them, or writes them anew.
+
+    python scripts/page_tables.py --check              all of them; an hour of one core
+    python scripts/page_tables.py reach grasp          writes what has changed into these pages
+    python scripts/page_tables.py reach --out FOLDER   keeps what the scripts print, too
+
+A table that is printed stands on the page with the same first row; where several have that, they
+are told apart by their order. What is printed and stands nowhere is said, and ends it with code 1,
+as with --check does a table that differs. Tables of times are left out, as these hang on the
+machine; so are pages that a script of their own writes between marks.
+"""
+
+import argparse
+import re
+import shlex
+import subprocess
+import sys
+from collections import defaultdict
+from pathlib import Path
+
+from tca_mj.files import write_whole
+from tca_mj.pages import command_line
+
+ROOT = Path(__file__).resolve().parent.parent
+# What prints the tables of pages, by a name; the pages are those of that name but for a few.
+PRINTED = {
+    "adaptive-grasp": "adaptive_page.py --tables",
+    "beyond": "beyond_page.py --tables",
+    "bistable": "bistable_page.py --tables",
+    "bistable-gripper": "bistable_gripper_page.py --tables",
+    "finger": "finger_page.py --tables",
+    "grasp": "grasp_page.py --tables",
+    "learned-model": "learned_model_page.py --tables",
+    "morphing": "morphing_module.py --tables",
+    "nodes": "node_table.py --nodes 4 6 8 10 12 16 --reference 48",
+    "reach": "reach_page.py --tables",
+    "rods": "tetrapod_certificate.py rods",
+    "shape-memory": "shape_memory.py --tables",
+    "tca": "tca_figures.py --tables",
+    "walk-limit": "walk_limit.py",
+    "warnings": "convexity_warnings.py",
+}
+ELSEWHERE = {
+    "bistable": ("bistable", "jump"), "nodes": ("soft-bodies",), "rods": ("tetrapod-model",),
+    "walk-limit": ("tetrapod",), "warnings": ("tetrapod",),
+}  # fmt: skip
+TABLE = re.compile(r"^\|.*\n\|[-:| ]+\|\n(?:\|.*\n)*", re.MULTILINE)
+
+
+def first_row(table: str) -> str:
+    """What tables are told apart by."""
+    return re.sub(r"\s+", " ", table.partition("\n")[0])
+
+
+def tables(text: str) -> dict[str, list[str]]:
+    """Tables of a text by their first rows."""
+    found = defaultdict(list)
+    for match in TABLE.finditer(text if text.endswith("\n") else f"{text}\n"):
+        found[first_row(match[0])].append(match[0])
+    return found
+
+
+def replaced(text: str, printed: dict[str, list[str]]) -> tuple[str, list[str], list[str]]:
+    """A page with printed tables in place of its own.
+
+    Args:
+        text: The page.
+        printed: Tables by their first rows.
+
+    Returns:
+        The page; the first rows that it has; those of them whose tables were others.
+    """
+    here = tables(text)
+    known = [head for head, each in printed.items() if len(here.get(head, ())) == len(each)]
+    changed = [head for head in known if here[head] != printed[head]]
+    for head in changed:
+        after = iter(printed[head])
+        text = TABLE.sub(
+            lambda m, head=head, after=after: next(after) if first_row(m[0]) == head else m[0], text
+        )
+    return text, known, changed
+
+
+def held(name: str, asked: argparse.Namespace) -> bool:
+    """Runs what prints a page's tables, and holds the page against that or writes it."""
+    print(f"{name}: {PRINTED[name]}", flush=True)
+    command = [sys.executable, *shlex.split(f"{ROOT / 'scripts'}/{PRINTED[name]}")]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    if asked.out:
+        write_whole(asked.out / f"{name}.md", done.stdout.encode())
+    if done.returncode:
+        print(done.stderr[-2000:])
+        return False
+    printed, there, differ = tables(done.stdout), set(), []
+    for page in ELSEWHERE.get(name, (name,)):
+        path = ROOT / "docs" / f"{page}.md"
+        text, known, changed = replaced(path.read_text(encoding="utf-8"), printed)
+        there |= {*known}
+        differ += changed
+        if changed and not asked.check:
+            write_whole(path, text.encode())
+    for head in printed:
+        said = "as it was" if head not in differ else "differs" if asked.check else "written"
+        print(f"  {said if head in there else 'on no page'}: {head}", flush=True)
+    return bool(printed) and there == printed.keys() and not (asked.check and differ)
+
+
+def main() -> int:
+    parser = command_line(__doc__)
+    parser.add_argument("names", nargs="*", help="which; without any, all")
+    parser.add_argument("--check", action="store_true", help="write nothing")
+    parser.add_argument("--out", type=Path, help="folder in which what is printed is kept")
+    asked = parser.parse_args()
+    unknown = sorted({*asked.names} - PRINTED.keys())
+    if unknown:
+        parser.error(f"names must be among {', '.join(PRINTED)}, got {', '.join(unknown)}")
+    if asked.out:
+        asked.out.mkdir(parents=True, exist_ok=True)
+    return 0 if all([held(name, asked) for name in asked.names or PRINTED]) else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())
