@@ -71,6 +71,7 @@ CURVES = (
     ("top_speed", "speed [mm/s]", 1.0, "nominal"),
     ("speed", "speed [mm/s]", 1e3, "± 20 %"),
     ("return_mean", "return", 1.0, ""),
+    ("error", "off its teachers [1]", 1.0, ""),
 )
 
 

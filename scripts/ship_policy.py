@@ -33,7 +33,8 @@ def main(argv: list[str] | None = None) -> None:
     path = replace(saved, evaluation={**ROBOTS, "figures": figures}).save(
         POLICIES / f"{arguments.name}{file.suffix}"
     )
-    curve = file.parent / ("curve.csv" if file.suffix == ".json" else "evaluations.csv")
+    curves = (file.parent / name for name in ("evaluations.csv", "curve.csv"))
+    curve = next(path for path in curves if path.is_file())
     path.with_suffix(".csv").write_bytes(curve.read_bytes())
     print(f"{report(summary)}\n\n{path}")
 

@@ -27,6 +27,7 @@ from tca_mj import checks, control, rod, variation
 from tca_mj.agents.model import TaskModel, Transitions, View
 from tca_mj.agents.policies.network import Network
 from tca_mj.agents.train.config import OffPolicy
+from tca_mj.agents.train.distil import Teacher
 from tca_mj.assets import mjcf
 from tca_mj.envs.task import SimulatedTask
 from tca_mj.envs.vector import TaskVector
@@ -350,6 +351,9 @@ BY_SURFACE: dict[str, dict[str, Any]] = {
         "task": TASK, "algorithm": "sac", "learner": lambda: _samples()[OffPolicy](),
     },
     "agents.train.config.default_config": {"task": TASK, "algorithm": "sac"},
+    **dict.fromkeys(("agents.train.distil.DistilConfig", "agents.train.distil.distil_config"),
+                    {"task": TASK, "teachers": lambda: (good(Teacher),)}),
+    "agents.train.distil.Teacher": {"policy": "bend-reach"},
     "agents.train.search.SearchConfig": {"task": "TCA/TetrapodWalk-v0"},
     "agents.train.sb3_env.TaskVecEnv.make": {"id": TASK},
     "envs.wrappers.RecordRerun": {"path": "wrapped.rrd"},

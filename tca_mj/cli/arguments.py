@@ -173,6 +173,18 @@ def parse_axis(text: str) -> tuple[str, tuple[Any, ...]]:
     return name, tuple(value(part) for part in values.split(","))
 
 
+def parse_teacher(text: str) -> tuple[str, dict[str, Any]]:
+    """A policy and options of a task, from ``POLICY:NAME=VALUE:NAME=VALUE``."""
+    policy, options = text, dict[str, Any]()
+    while ":" in policy and "=" in policy.rpartition(":")[2]:
+        policy, _, last = policy.rpartition(":")
+        name, value = parse_option(last)
+        options = {name: value, **options}
+    if not policy:
+        raise argparse.ArgumentTypeError(f"must be POLICY:NAME=VALUE, got {_short(text)}")
+    return policy, options
+
+
 def parse_folder(text: str) -> Path:
     """A folder that one may write into, there or to be made."""
     path = Path(text)

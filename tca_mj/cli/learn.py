@@ -1,4 +1,5 @@
-"""Policies: ``eval`` measures one, ``train`` makes one, ``sweep`` does so at many settings."""
+"""Policies: ``eval`` measures one, ``train`` makes one, ``distil`` makes one of several, ``sweep``
+evaluates or trains at many settings."""
 
 import argparse
 import shlex
@@ -17,13 +18,14 @@ from tca_mj.cli.arguments import (
     parse_number,
     parse_option,
     parse_seconds,
+    parse_teacher,
     task_name,
 )
 from tca_mj.registry import ALGORITHMS
 
 
 def add_commands(commands: Commands) -> None:
-    """Adds eval, train and sweep."""
+    """Adds eval, train, distil and sweep."""
     evaluation = add_command(commands, "eval", _eval, help="measure how good a policy is")
     add(evaluation, "policy", "who acts", metavar="POLICY")
     add(evaluation, "--task", "its id", required=True)
@@ -67,6 +69,21 @@ def add_commands(commands: Commands) -> None:
         action=argparse.BooleanOptionalAction, default=True)  # fmt: skip
     add(train, "--start", "gait to begin with or to correct: scripted, trot, a policy's file or"
         " name, random for none; default: by task, scripted for cma", metavar="GAIT")  # fmt: skip
+
+    distil = add_command(commands, "distil", _distil, help="make one policy of several", extra="rl")
+    add(distil, "teachers", "who is learned from, and the options of the task with which it knows"
+        " what to do", nargs="+", type=parse_teacher, metavar="POLICY:NAME=VALUE")  # fmt: skip
+    add(distil, "--task", "its id", required=True)
+    add(distil, "--option", "an option of every reset besides; may be given several times",
+        action="append", default=[], type=parse_option, metavar="NAME=VALUE",
+        dest="options")  # fmt: skip
+    add(distil, "--argument", "an argument that the task is made with; with several values, as many"
+        " environments with each", action="append", default=[], type=parse_axis,
+        metavar="NAME=VALUE,...", dest="made_with")  # fmt: skip
+    add(distil, "--steps", "steps of the task in all; default 18000")
+    add(distil, "--envs", "environments at a time, of each kind; default 6")
+    add(distil, "--seed", "default 0")
+    add(distil, "--out", "folder; default runs/distil/TASK")
 
     sweep = add_command(
         commands, "sweep", _sweep, help="evaluate or train at many settings", extra="sweep"
@@ -208,6 +225,64 @@ def _command(arguments: argparse.Namespace) -> str:
     for name, value in arguments.options:
         words += ["--option", f"{name}={value}"]
     return shlex.join(words)
+
+
+def _distil(arguments: argparse.Namespace) -> int:
+    """Makes one policy of several that see and do the same, and writes the run into the folder
+    --out. Each teacher knows what to do with some options of the task; the pupil, a network of two
+    layers of 256, learns what all of them do, in episodes that it drives itself (DAgger). Options
+    and time step are those of the task's recipe where nothing else is said. Ctrl-C and even kill -9
+    lose at most a round, in which each environment makes as many steps as an episode has: the same
+    command again goes on with the run. With the same --seed and teachers the policy is the same
+    to the last digit.
+
+    The folder holds
+      best.npz        the policy after the last round
+      curve.csv       for each round how far the pupil, as it was before, was off its teachers
+                      (error, of actions from -1 to 1, as the root of the mean square), in all and
+                      for each, and what it earned
+      run.json        settings, command, versions, machine
+      state.pkl       where the run stands; only go on with runs that you trust
+
+    A teacher is a policy's file, a shipped policy's name or the folder of a training run. It has to
+    be a network; observations may be scaled otherwise. Needs the extra rl.
+
+    examples:
+      tca-mj distil runs/a:NAME=VALUE runs/b:NAME=VALUE --task TASK --out runs/one
+      tca-mj distil POLICY --task {task} --argument NAME=VALUE,VALUE
+    """
+    import tca_mj.agents.train.distil as distilling
+
+    out = arguments.out or Path("runs/distil") / task_name(arguments.task)
+    given: dict[str, Any] = {"seed": arguments.seed, "options": dict(arguments.options),
+                             "arguments": dict(arguments.made_with)}  # fmt: skip
+    for name in ("steps", "envs"):
+        if getattr(arguments, name) is not None:
+            given[name] = getattr(arguments, name)
+    teachers = tuple(
+        distilling.Teacher(policy=policy, options=options) for policy, options in arguments.teachers
+    )
+    words = ["tca-mj", "distil"]
+    words += [":".join([policy, *(_given(*each) for each in options.items())])
+              for policy, options in arguments.teachers]  # fmt: skip
+    words += ["--task", arguments.task]
+    for option, pairs in (("option", arguments.options), ("argument", arguments.made_with)):
+        for each in pairs:
+            words += [f"--{option}", _given(*each)]
+    for name in ("steps", "envs", "seed"):
+        if getattr(arguments, name) is not None:
+            words += [f"--{name}", str(getattr(arguments, name))]
+    arguments.kept.append(f"the same command goes on with {out}")
+    config = distilling.distil_config(arguments.task, teachers, **given)
+    distilling.distil(config, out, command=shlex.join(words))
+    print(f"  {out / distilling.POLICY}")
+    return 0
+
+
+def _given(name: str, value: Any) -> str:
+    """An option as it is typed."""
+    several = value if isinstance(value, list | tuple) else [value]
+    return f"{name}={','.join(map(str, several))}"
 
 
 def _sweep(arguments: argparse.Namespace) -> int:
