@@ -26,7 +26,7 @@ import torch
 from numpy.typing import NDArray
 
 from tca_mj.agents.output import write_csv
-from tca_mj.agents.policies import Network, Origin, SavedPolicy
+from tca_mj.agents.policies import Network, SavedPolicy
 from tca_mj.agents.policies.contracts import contract, differences
 from tca_mj.agents.policies.load import find
 from tca_mj.agents.progress import progress_bar
@@ -103,7 +103,7 @@ class DistilConfig(Checked):
 
     task: str
     teachers: tuple[Teacher, ...]
-    steps: Steps = 18_000
+    steps: Steps = 15_000
     seed: LearnerSeed = 0
     envs: Envs = 6
     options: Mapping[str, Any] = field(default_factory=dict)
@@ -140,7 +140,7 @@ def distil_config(task: str, teachers: tuple[Teacher, ...], **change: Any) -> Di
     """
     recipe = next(iter(recipes(task).values()), Recipe(steps=1))
     options = {**recipe.options, **change.pop("options", {})}
-    usual = {"timestep": recipe.timestep, "options": options}
+    usual: dict[str, Any] = {"timestep": recipe.timestep, "options": options}
     return DistilConfig(task=task, teachers=teachers, **usual | change)
 
 
@@ -184,6 +184,7 @@ def distil(
             progress=progress,
         )  # fmt: skip
         ends.callback(bar.close)
+        explain = partial(lesson.explain, folder, state)
         while len(rows) < lesson.rounds:
             random = np.random.default_rng((config.seed, 3, len(rows)))
             pupil = lesson.network(state["layers"]) if rows else None
@@ -192,13 +193,10 @@ def distil(
             state["layers"] = lesson.fit(state["layers"], state["rounds"], random)
             rows.append({"steps": (len(rows) + 1) * lesson.size, **row})
             folder.save(state)
+            explain()
             bar.update(lesson.size)
             bar.set_postfix({name: f"{row[name]:.3f}" for name in row if name == "error"})
-        write_csv(out / CURVE, rows)
-        steps = len(rows) * lesson.size
-        saved = lesson.policy(state["layers"], folder.origin("dagger", steps, lesson.source))
-        saved.save(out / POLICY)
-    return saved
+        return explain()  # the state may be newer, if the run was killed in between
 
 
 class _Lesson:
@@ -368,12 +366,17 @@ class _Lesson:
             units=self.observation.units,
         )  # fmt: skip
 
-    def policy(self, layers: list[Floats], origin: Origin) -> SavedPolicy:
-        """The network as a policy of the task."""
-        return SavedPolicy(
-            task=self.config.task, network=self.network(layers), arguments=self.arguments,
-            made_for=self.made_for, origin=origin,
+    def explain(self, folder: RunFolder, state: Mapping[str, Any]) -> SavedPolicy:
+        """Writes what follows from a state: the curve and the policy, which it returns."""
+        rows = state["rows"]
+        write_csv(folder.path / CURVE, rows)
+        saved = SavedPolicy(
+            task=self.config.task, network=self.network(state["layers"]), made_for=self.made_for,
+            arguments=self.arguments,
+            origin=folder.origin("dagger", len(rows) * self.size, self.source),
         )  # fmt: skip
+        saved.save(folder.path / POLICY)
+        return saved
 
     def close(self) -> None:
         """Ends the tasks."""

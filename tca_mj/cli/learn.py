@@ -80,7 +80,7 @@ def add_commands(commands: Commands) -> None:
     add(distil, "--argument", "an argument that the task is made with; with several values, as many"
         " environments with each", action="append", default=[], type=parse_axis,
         metavar="NAME=VALUE,...", dest="made_with")  # fmt: skip
-    add(distil, "--steps", "steps of the task in all; default 18000")
+    add(distil, "--steps", "steps of the task in all; default 15000")
     add(distil, "--envs", "environments at a time, of each kind; default 6")
     add(distil, "--seed", "default 0")
     add(distil, "--out", "folder; default runs/distil/TASK")
