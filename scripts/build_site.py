@@ -184,7 +184,8 @@ def write_replays(pages: Path) -> None:
     for name, (title, *how) in REPLAYS.items():
         replay(pages / "replays" / f"{name}.html", *how)
         blocks += [f"## {title}", f'<iframe src="{name}.html" title="{title}" loading="lazy"'
-                   ' style="width: 100%; aspect-ratio: 4 / 3; border: 0"></iframe>']  # fmt: skip
+                   ' style="width: 100%; aspect-ratio: 4 / 3; min-height: 24rem; border: 0">'
+                   "</iframe>"]  # fmt: skip
     write_whole(pages / "replays.md", ("\n\n".join(blocks) + "\n").encode())
 
 

@@ -102,3 +102,32 @@ def test_the_page_of_tasks_has_the_options_of_all():
         rows = gym.make(task.id, disable_env_checker=True).unwrapped.options.rows
         own = Options([row for row in rows if row.name not in common.names])
         assert f"`{task.id}`:\n\n{own.markdown()}\n" in page
+
+
+def test_numbers_of_the_readme_are_those_of_the_pages():
+    """Those that a command writes into a page; rounded as they are in the README."""
+    page = {path.name: path.read_text(encoding="utf-8") for path in PAGES}
+    readme = re.sub(r"\s+", " ", (ROOT / "README.md").read_text(encoding="utf-8"))
+
+    def number(pattern, text):
+        (found,) = re.findall(pattern, text)
+        return float(found.rstrip("."))
+
+    facts = number(r"recomputes (\d+) reported facts", readme)
+    assert facts == number(r"(\d+) facts: \d+ held", page["validation.md"])
+    _, _, walk = page["gaits.md"].partition("## `TCA/TetrapodWalk-v0`")
+    walk = walk.partition("\n## ")[0]
+    learned = number(r"\| \*\*SAC, mean of 5 seeds\*\* \| \*\*([\d.]+) ", walk)
+    for words, other in (("the script", "scripted"), ("the best of", "tetrapod-walk")):
+        said = number(rf"([\d.]+) % faster than {words}", readme)
+        gain = learned / number(rf"\n\| {other} \| ([\d.]+) ", walk) - 1.0
+        assert said == round(100.0 * gain), words
+    rods = dict(re.findall(r"\| (0\.\d+) mm \| [\d.]+ \| [\d.]+ \| ([\d.]+) ",
+                           page["tetrapod-model.md"]))  # fmt: skip
+    speeds = {"0.50": r"the scripted walk goes at ([\d.]+) mm/s", "0.45": r"0.45 mm at ([\d.]+)",
+              "0.40": r"0.4 mm at ([\d.]+)"}  # fmt: skip
+    for rod, pattern in speeds.items():
+        assert number(pattern, readme) == round(float(rods[rod]), 1), rod
+    off = number(r"is at most ([\d.]+)° off after 5 s", readme)
+    assert off == round(number(r"at most ([\d.]+)° off in \d+ predictions",
+                               page["learned-model.md"]), 1)  # fmt: skip
