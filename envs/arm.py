@@ -16,6 +16,7 @@ from tca_mj.drive import Drive, Timestep
 from tca_mj.envs.objects import named, stand, touching
 from tca_mj.envs.options import Option, Options, Setup, Uniform, variation_options
 from tca_mj.envs.outcome import Verdict
+from tca_mj.envs.recipe import Recipe
 from tca_mj.envs.rewards import tolerance
 from tca_mj.envs.table import Entry, Table
 from tca_mj.envs.task import SimulatedTask, TaskArguments, parts
@@ -46,6 +47,14 @@ OBSERVATION = Table(
         Entry("cup position", 3, -0.6, 0.6, "m", scale=0.025),
     ]
 )
+_FAR = 25e-3  # from where on an offset is seen as no larger [m]
+OFFSETS = (
+    Entry("gripper to object", 3, -_FAR, _FAR, "m", scale=5e-3),
+    Entry("object to cup", 2, -_FAR, _FAR, "m", scale=1e-2),
+    Entry("misalignment", 1, -np.pi / 2.0, np.pi / 2.0, "rad", scale=0.3),
+    Entry("spare opening", 1, -_FAR, _FAR, "m", scale=3e-3),
+)
+"""Rows of an observation with ``offsets``: what the others say, as differences."""
 ACTION = Table(
     [
         Entry("TCA heating", 5, -1.0, 1.0, "-", off=-1.0),
@@ -59,6 +68,22 @@ _PARKED = (0.06, 0.05)  # where the object that is not used stands [m]
 # Turns the gripper's y and z axes, so that a gripper that hangs straight has no rotation.
 _HANGING = np.array([1.0, -1.0, -1.0] * 3)
 _CUP_RADIUS, _CUP_RIM = 12.5e-3, 16e-3  # of assets/mjcf/cup.xml [m]
+
+
+def yaw(orientation: NDArray[np.float64]) -> float:
+    """Angle about the world's z axis of a quaternion wxyz [rad]."""
+    w, x, y, z = orientation
+    return float(np.arctan2(2.0 * (x * y + w * z), 1.0 - 2.0 * (y * y + z * z)))
+
+
+def misaligned(long_side: float, gripper: float) -> float:
+    """By which angle a gripper has to turn to lie across an object, half turns aside [rad].
+
+    Args:
+        long_side: Yaw of the object's long side [rad].
+        gripper: Yaw of the gripper, along whose x axis the fingers close [rad].
+    """
+    return (long_side - np.pi / 2.0 - gripper + np.pi / 2.0) % np.pi - np.pi / 2.0
 
 
 def _draw_object(random: np.random.Generator, setup: Setup) -> str:
@@ -80,6 +105,10 @@ class ArmPickPlace(SimulatedTask):
     orientations are those of the world; the gripper's are of the point where its tips meet when
     closed, with the fingers in its x-z plane and z from tips to mount, so that it is not turned
     while it hangs straight. The first number of a quaternion is not negative.
+
+    With ``offsets`` it ends with the rows of ``OFFSETS``, shape (50,): millimetres decide here, of
+    positions that differ by centimetres. They are of places no further than 25 mm apart;
+    the misalignment is the angle by which the wrist has to turn, half turns aside.
 
     Reward, the sum of the terms in ``info["reward_terms"]``. The first two pay for progress and
     take it back, so that nothing is earned by staying where they are high:
@@ -110,6 +139,20 @@ class ArmPickPlace(SimulatedTask):
     cameras = ("front", "side", "close")
     scripted = "tca_mj.agents.scripts.arm:scripted"
     scripted_arguments = {"action": "power"}
+    script_holds = True
+    recipes = {
+        "sac": Recipe.held(
+            40_000, 0.2, discount=0.93, interval=2000, start="scripted", successes=True,
+            limit=12.0, episodes=24, arguments={"offsets": True},
+            practised={"object": "screwdriver"},
+            learner={
+                "learning_rate": 5e-4, "batch_size": 256, "tau": 0.01, "ent_coef": "auto_0.05",
+                "learning_starts": 6000, "gradient_steps": 16, "hidden": (128, 128),
+                "buffer_size": 150_000, "n_steps": 3, "imitation": 8.0, "target_entropy": -10.0,
+                "last_rate": 0.3,
+            },
+        )
+    }
     robot_argument = ("arm_spec", ArmSpec)
     film_speed = 4.0
 
@@ -119,6 +162,7 @@ class ArmPickPlace(SimulatedTask):
         *,
         arm_spec: ArmSpec | None = None,
         timestep: Timestep = 5e-3,
+        offsets: bool = False,
         **common: Unpack[TaskArguments],
     ) -> None:
         """Builds the scene.
@@ -126,6 +170,7 @@ class ArmPickPlace(SimulatedTask):
         Args:
             arm_spec: The arm, by default the published one.
             timestep: Physics time step; five of them must divide ``control_period`` [s].
+            offsets: Whether offsets are seen, too, as rows of their own.
             **common: See ``TaskArguments``.
 
         Raises:
@@ -141,7 +186,9 @@ class ArmPickPlace(SimulatedTask):
         sim = Simulation(part, timestep=timestep, tca_period=5.0 * timestep)
         size = self.arm_spec.height + float(sim.bank.longest.max())
         around = (-size, size)
-        seen = OBSERVATION.covering(
+        self._offsets = offsets
+        rows = (*OBSERVATION.entries, *OFFSETS) if offsets else OBSERVATION.entries
+        seen = Table(rows).covering(
             {
                 "base height": (0.0, size), "TCA length": (0.0, float(sim.bank.longest.max())),
                 "gripper position": around, "object position": around, "cup position": around,
@@ -260,7 +307,7 @@ class ArmPickPlace(SimulatedTask):
         mujoco.mju_mat2Quat(turn, data.site_xmat[self._grasp] * _HANGING)
         dofs = self._free_v[self.object]
         object_turn = data.xquat[self._body[self.object]]
-        return {
+        values: dict[str, ArrayLike] = {
             "base height": data.qpos[self._lift_q],
             "base velocity": data.qvel[self._lift_v],
             "TCA temperature": sim.temperature,
@@ -276,6 +323,19 @@ class ArmPickPlace(SimulatedTask):
             "object angular velocity": data.qvel[dofs + 3 : dofs + 6],
             "object carried": float(self._carried),
             "cup position": data.mocap_pos[self._cup],
+        }
+        return values | self._apart(values) if self._offsets else values
+
+    def _apart(self, seen: dict[str, Any]) -> dict[str, ArrayLike]:
+        """The rows of ``OFFSETS``."""
+        place, cup = seen["object position"], seen["cup position"]
+        offset = place - seen["gripper position"]
+        yaws = yaw(seen["object orientation"]), yaw(seen["gripper orientation"])
+        return {
+            "gripper to object": np.clip(offset, -_FAR, _FAR),
+            "object to cup": np.clip(cup[:2] - place[:2], -_FAR, _FAR),
+            "misalignment": misaligned(*yaws),
+            "spare opening": np.clip(seen["gripper opening"] - seen["object width"], -_FAR, _FAR),
         }
 
     def _measure(self) -> tuple[dict[str, float], bool]:

@@ -43,8 +43,13 @@ class Recipe(Checked):
         grown: Fields of this that are others where one of them is given.
         discount: What a reward is worth that comes a second later, above 0 up to 1; None for the
             learner's own, per step [1].
-        start: Whose steps come first in the memory: those of a gait, as in ``TrainConfig``, or
-            "random".
+        start: Whose steps come first in the memory: those of a gait or script, as in
+            ``TrainConfig``, or "random".
+        successes: Whether half of each batch of memories is from the script's successes.
+        practised: Options that every third environment is reset with.
+        limit: Duration after which episodes are cut off in the run; None for the task's own [s].
+        arguments: What else the task is made with, by name.
+        episodes: Episodes of an evaluation; None for the trainer's own.
         learner: What else differs from the algorithm's defaults, under the names of
             Stable-Baselines3.
         interval: Steps between two points of the learning curve; None for the trainer's own.
@@ -66,6 +71,11 @@ class Recipe(Checked):
     grown: Mapping[str, Any] = field(default_factory=dict)
     discount: _Discount | None = None
     start: str = "random"
+    successes: bool = False
+    practised: Mapping[str, Any] = field(default_factory=dict)
+    limit: Positive | None = None
+    arguments: Mapping[str, Any] = field(default_factory=dict)
+    episodes: _Steps | None = None
     learner: Mapping[str, Any] = field(default_factory=dict)
     interval: _Steps | None = None
 

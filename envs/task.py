@@ -145,6 +145,8 @@ class SimulatedTask(gym.Env[Observation, Action], ABC):
             callable. A task that needs no memory for it may have a method ``script`` instead, from
             an observation to an action.
         scripted_arguments: Arguments of ``__init__`` that its scripted policy needs.
+        script_holds: Whether what ``scripted`` makes tells temperatures, too, in a task that takes
+            those, and as long as that holds them: then a learner can begin with its steps.
         robot_argument: Argument of ``__init__`` that is the robot's specification, and what makes
             the default one; None if it has none.
         legs: Legs, each with the same TCAs, that a gait can drive; 0 if none can.
@@ -179,6 +181,7 @@ class SimulatedTask(gym.Env[Observation, Action], ABC):
     end_price: ClassVar[float] = 0.0
     scripted: ClassVar[str | Callable[[Any], Any] | None] = None
     scripted_arguments: ClassVar[Mapping[str, Any]] = {}
+    script_holds: ClassVar[bool] = False
     robot_argument: ClassVar[tuple[str, Callable[[], Any]] | None] = None
     finer: ClassVar[Mapping[str, Callable[[Any], dict[str, Any]]]] = {}
 

@@ -95,6 +95,7 @@ NO_DOOR = {
             "envs.table.Table.read", "envs.table.Table.outside", "envs.table.Table.bounded",
             "envs.task", "envs.vector", "agents.train.sb3_env.*", "agents.policies.actors.Blind",
             "agents.rollout", "agents.scripts.guided", "agents.train.mirrored",
+            "agents.train.successes",
             "envs.command.Following", "envs.command.Retelling.notes", "envs.command.Retelling.told",
         ),
         _ACTS,

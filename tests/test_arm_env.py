@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from gymnasium.vector import AsyncVectorEnv
 
-from tca_mj.envs.arm import ACTION, OBJECTS, OBSERVATION, ArmPickPlace
+from tca_mj.envs.arm import ACTION, OBJECTS, OBSERVATION, OFFSETS, ArmPickPlace
 from tca_mj.envs.table import Entry, Table
 
 ID = "TCA/ArmPickPlace-v0"
@@ -92,6 +92,31 @@ def test_the_observation_is_what_the_simulation_says(shared):
     site = data.site("arm.gripper.grasp").xmat.reshape(3, 3)
     assert frame.reshape(3, 3) == pytest.approx(site @ hanging, abs=1e-6)
     assert rows["gripper orientation"][0] > 0.9
+
+
+def test_offsets_are_what_the_other_rows_say():
+    """They come last, far ones are cut off, and nothing else changes."""
+    plain, env = ArmPickPlace(), ArmPickPlace(offsets=True)
+    assert env.observation.size == OBSERVATION.size + sum(row.size for row in OFFSETS)
+    given = {"object": "pcb", "object_position": (1e-3, -2e-3), "object_yaw": 2.2}
+    for task in (plain, env):
+        task.reset(seed=4, options=given)
+    down = np.array([-1.0, 0.2, -1.0, 0.5, 0.3, -1.0], dtype=np.float32)
+    for _ in range(12):
+        observation, *_ = env.step(down)
+        assert np.array_equal(plain.step(down)[0], observation[: OBSERVATION.size])
+        assert env.observation_space.contains(observation)
+        rows = env.observation.read(observation.astype(float))
+        apart = rows["object position"] - rows["gripper position"]
+        assert rows["gripper to object"] == pytest.approx(apart.clip(-25e-3, 25e-3), abs=1e-7)
+        way = rows["cup position"][:2] - rows["object position"][:2]
+        assert rows["object to cup"] == pytest.approx(way.clip(-25e-3, 25e-3), abs=1e-7)
+        spare = rows["gripper opening"] - rows["object width"]
+        assert rows["spare opening"] == pytest.approx(spare, abs=1e-7)
+    assert abs(apart[2]) < 25e-3  # near by now
+    env.reset(seed=4, options=given)
+    straight = float(env.observation.read(env.seen())["misalignment"][0])
+    assert straight == pytest.approx(2.2 - math.pi / 2.0, abs=1e-3)  # the wrist is not turned yet
 
 
 def test_the_action_heats_and_moves(shared):

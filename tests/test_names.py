@@ -67,7 +67,8 @@ INTERNAL = {
     "tca_mj.certify": {"": "*"},
     "tca_mj.validation": {"": "*"},
     "tca_mj.envs": {
-        "adaptive": "OBJECTS Thing", "command": "command_options commanded drawn",
+        "adaptive": "OBJECTS Thing", "arm": "misaligned yaw",
+        "command": "command_options commanded drawn",
         "gaits": "told", "options": "variation_of",
         "holding": "*", "objects": "*",
         "outcome": "broken_off finite harm how_it_ended measured together",
@@ -83,7 +84,8 @@ INTERNAL = {
         "fit": "require_same", "predictive": "Foresight nothing planned",
     },
     "tca_mj.agents.policies": {
-        "actors": "called first_gaits", "archives": "*", "load": "require_untold", "onnx": "*",
+        "actors": "called first_gaits script_of", "archives": "*",
+        "load": "require_untold", "onnx": "*",
     },
     "tca_mj.agents.scripts": {
         # one for each task, found by the task's ``scripted``
@@ -95,7 +97,7 @@ INTERNAL = {
     "tca_mj.agents.train": {
         "config": "best_algorithm described", "deep": "Run exported film learner record",
         "demonstrations": "*", "gait_score": "*", "learning_env": "*", "runs": "*",
-        "sb3_env": "silence",
+        "sb3_env": "silence", "successes": "*",
     },
 }  # fmt: skip
 # Packages that are an arrangement of files: what they have for users, the package above offers.

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tca_mj.agents.scripts.arm import PHASES, PickAndPlace
+from tca_mj.agents.scripts.arm import PHASES, PickAndPlace, scripted
 from tca_mj.envs.arm import OBJECTS, OBSERVATION, ArmPickPlace
 
 
@@ -39,3 +39,28 @@ def test_the_object_is_held_to_the_cup_and_let_go_there(kind):
     assert held["release"] == pytest.approx(held["turn back"], abs=2e-3)
     assert opening > 0.5 * OBJECTS[kind]
     assert 140.0 < hottest < 165.0
+
+
+def test_it_tells_temperatures_to_hold_as_well():
+    """For 0.2 s each, which is how it is shown to a learner."""
+    env = ArmPickPlace(control_period=0.2)
+    policy = scripted(env)
+    assert (policy.told, policy.period) == ("temperature", 0.2)
+    observation, info = env.reset(seed=3, options={"object": "pcb"})
+    hottest = 0.0
+    for _ in range(60):
+        action = policy.act(observation)
+        assert env.action_space.contains(action)
+        observation, _, terminated, truncated, info = env.step(action)
+        hottest = max(hottest, float(info["temperature"].max()))
+        if terminated or truncated:
+            break
+    assert info["success"]
+    assert 100.0 < hottest < 160.0
+
+
+def test_what_it_cannot_tell_is_refused():
+    with pytest.raises(ValueError, match="told must be one of"):
+        PickAndPlace(told="pressure")
+    with pytest.raises(ValueError, match="period must be finite and above 0"):
+        PickAndPlace(period=0.0)

@@ -153,6 +153,12 @@ def scripted(env: gym.Env[Any, Any]) -> Policy:
     if maker is None:
         raise ValueError(f"policy must be another than 'scripted', got {type(task).__name__}")
     require_arguments(task.scripted_arguments, env)
+    return script_of(task)
+
+
+def script_of(task: Any) -> Policy:
+    """What ``task.scripted`` makes, whatever the task was made with."""
+    maker = task.scripted
     if isinstance(maker, str):
         module, _, name = maker.partition(":")
         maker = getattr(import_module(module), name)

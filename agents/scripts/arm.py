@@ -9,13 +9,15 @@ while the arm bends.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any
+from functools import partial
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tca_mj.checks import Checked, NotNegative, Positive, Temperature
-from tca_mj.envs.arm import OBSERVATION, ArmPickPlace
+from tca_mj.checks import Checked, NotNegative, Positive, Temperature, require_one_of
+from tca_mj.envs.arm import OBSERVATION, ArmPickPlace, misaligned, yaw
+from tca_mj.envs.task import HEATINGS
 from tca_mj.robots.arm import ArmSpec, arm
 from tca_mj.tca.spec import heat_of
 
@@ -122,6 +124,8 @@ class PickAndPlace(Checked):
     Attributes:
         arm_spec: The arm it was told that it has.
         gains: What it was tuned to.
+        period: Time between two actions [s].
+        told: What it tells the TCAs, ``power`` or ``temperature``, as the task's ``action``.
         phase: What it is doing, one of ``PHASES``.
         since: Time in this phase [s].
         tries: How often it went for the object.
@@ -129,6 +133,8 @@ class PickAndPlace(Checked):
 
     arm_spec: ArmSpec = field(default_factory=ArmSpec)
     gains: PickAndPlaceGains = field(default_factory=PickAndPlaceGains)
+    period: Positive = _DT
+    told: Annotated[str, partial(require_one_of, choices=HEATINGS)] = "power"
 
     def __post_init__(self) -> None:
         Checked.__post_init__(self)
@@ -149,12 +155,13 @@ class PickAndPlace(Checked):
         if self._mean is None:
             self._mean = np.stack([seen.gripper, seen.object])
         # The soft arm swings: steering on what it does on average does not drive the swing.
-        self._mean += _DT / self.gains.averaging * ([seen.gripper, seen.object] - self._mean)
+        share = self.period / self.gains.averaging
+        self._mean += share * ([seen.gripper, seen.object] - self._mean)
         seen.gripper, seen.object = self._mean
-        self.since += _DT
-        self._time += _DT
+        self.since += self.period
+        self._time += self.period
         unchanged = abs(seen.opening - self._opening) < self.gains.still
-        self._calm = self._calm + _DT if unchanged else 0.0
+        self._calm = self._calm + self.period if unchanged else 0.0
         self._opening = seen.opening
         following = self._next(seen)
         if following != self.phase:
@@ -216,17 +223,23 @@ class PickAndPlace(Checked):
             target[_GRIPPER] = seen.temperature[_GRIPPER] + gains.opening_slope * (
                 wanted - seen.opening
             )
-        power = self._power(seen.temperature, np.minimum(target, gains.hottest))
-        climb = self._climb(seen) / self.arm_spec.speed
-        action = np.append(2.0 * power / ArmPickPlace.max_power - 1.0, climb)
+        heat = self._heating(seen.temperature, np.minimum(target, gains.hottest))
+        action = np.append(heat, self._climb(seen) / self.arm_spec.speed)
         return np.clip(action, -1.0, 1.0).astype(np.float32)
 
-    def _power(self, now: Array, wanted: Array) -> Array:
-        """What brings the TCAs to a temperature, shape (n,) [W]; -inf is off."""
-        heat = self._heat
+    def _heating(self, now: Array, wanted: Array) -> Array:
+        """What brings the TCAs to a temperature, -inf being off, as an action, shape (n,)."""
+        heat, settling = self._heat, self.gains.settling
         hold = heat.keeping(np.maximum(np.minimum(now, wanted), self._body), self._body)
-        self._body = heat.body_after(self._body, now, _DT)
-        return np.maximum(hold + heat.capacity * (wanted - now) / self.gains.settling, 0.0)
+        self._body = heat.body_after(self._body, now, self.period)
+        if self.told == "power":
+            power = np.maximum(hold + heat.capacity * (wanted - now) / settling, 0.0)
+            return 2.0 * power / ArmPickPlace.max_power - 1.0
+        # A thermostat is faster than ``settling``: it is told a temperature on the way.
+        way = np.maximum(wanted, heat.ambient) - now
+        asked = now + min(1.0, self.period / settling) * way
+        asked = np.where(np.isfinite(wanted), asked, heat.ambient)
+        return 2.0 * (asked - heat.ambient) / (ArmPickPlace.safe_temperature - heat.ambient) - 1.0
 
     def _steer(self, seen: _Seen, error: Array) -> Array:
         """Temperatures of the three bending TCAs that take the gripper along ``error`` [m].
@@ -237,7 +250,7 @@ class PickAndPlace(Checked):
         rate, now = (
             (gains.bend_rate, gains.bend_now) if bending else (gains.align_rate, gains.align_now)
         )
-        self._bend = self._bend + rate * _DT * error
+        self._bend = self._bend + rate * self.period * error
         wanted = self._bend + now * error
         share = (2.0 / 3.0) * _SIDES @ wanted
         share -= share.min()
@@ -296,17 +309,11 @@ class _Seen:
         self.object = rows["object position"]
         self.cup = rows["cup position"]
         # The fingers close along the gripper's x axis; neutral is the world's x axis.
-        self.yaw = _yaw(rows["gripper orientation"])
-        long_side = _yaw(rows["object orientation"])
+        self.yaw = yaw(rows["gripper orientation"])
         # The long side has to lie across the fingers; half turns do not matter.
-        self.misaligned = (long_side - np.pi / 2.0 - self.yaw + np.pi / 2.0) % np.pi - np.pi / 2.0
-
-
-def _yaw(orientation: Array) -> float:
-    w, x, y, z = orientation
-    return float(np.arctan2(2.0 * (x * y + w * z), 1.0 - 2.0 * (y * y + z * z)))
+        self.misaligned = misaligned(yaw(rows["object orientation"]), self.yaw)
 
 
 def scripted(task: Any) -> PickAndPlace:
-    """The scripted policy of an ``ArmPickPlace``."""
-    return PickAndPlace()
+    """The scripted policy of an ``ArmPickPlace``; it tells the TCAs what those of the task take."""
+    return PickAndPlace(period=task.control_period, told=task.heating)

@@ -31,6 +31,10 @@ def _entropy(name: str, value: Any) -> float | str:
     return value
 
 
+def _target(name: str, value: Any) -> float | str:
+    return value if value == "auto" else number(name, value, at_least=-1000.0, at_most=1000.0)
+
+
 # No run takes more; what is beyond is a slip.
 Part = Annotated[float, partial(number, above=0.0, at_most=1.0)]
 Few = Annotated[int, partial(whole, at_least=1, at_most=10_000)]
@@ -90,6 +94,11 @@ class OffPolicy(Checked):
         tau: Share by which the target network follows, above 0 up to 1 [1]; CrossQ has none.
         ent_coef: Weight of the entropy, 0 to 10 [1]; or ``auto``, or ``auto_`` and the weight to
             begin with. TD3 has none.
+        target_entropy: Entropy of an action that ``auto`` aims at, -1000 to 1000, or ``auto`` for
+            minus the numbers of an action [1].
+        n_steps: Steps whose rewards a memory adds up, up to 10 000; 1 with mirrored memories.
+        imitation: Weight of what was shown where half of each batch is from there, 0 to 1000, see
+            ``tca_mj.agents.train.successes`` [1].
         use_sde: Whether noise depends on what is seen (gSDE); not of TD3.
         noise: Standard deviation of TD3's actions, above 0 up to 1 [1]; the others find their own.
         hidden: Widths of the up to 16 hidden layers of actor and critics, with ReLU; up to 10 000.
@@ -108,6 +117,9 @@ class OffPolicy(Checked):
     gamma: Part = 0.98
     tau: Part = 0.01
     ent_coef: Annotated[float | str, _entropy] = "auto"
+    target_entropy: Annotated[float | str, _target] = "auto"
+    n_steps: Few = 1
+    imitation: Annotated[float, partial(number, at_least=0.0, at_most=1000.0)] = 0.0
     use_sde: bool = False
     noise: Part = 0.1
     hidden: Widths = (64, 64)
@@ -143,7 +155,12 @@ class TrainConfig(Checked):
             a policy of its own [K].
         start: The gait that is corrected, or else that makes the first steps, which memories are
             filled with before anything is learned: ``scripted``, ``trot``, or a policy's file or
-            name; ``random`` for steps by chance.
+            name; ``random`` for steps by chance. A task without legs knows ``scripted``.
+        successes: Whether half of each batch of memories is from the script's episodes that
+            succeeded. The best policy is then the one that earns most, discounted over the time
+            that an episode took.
+        practised: Options, on top of ``options``, that every third environment is reset with.
+        limit: Duration after which episodes are cut off in the run; None for the task's own [s].
         interval: Steps between two rows of the curve, after which the state is written, up to a
             billion.
         evaluate_every: Intervals between two evaluations, up to a million.
@@ -171,6 +188,9 @@ class TrainConfig(Checked):
     growth: Mapping[str, Steps] = field(default_factory=dict)
     residual: Annotated[float, partial(number, at_least=0.0, at_most=50.0, unit="K")] = 0.0
     start: str = "random"
+    successes: bool = False
+    practised: Mapping[str, Any] = field(default_factory=dict)
+    limit: Positive | None = None
     interval: Steps = 10_000
     evaluate_every: Many = 2
     evaluation_episodes: Few = 5
@@ -198,6 +218,21 @@ class TrainConfig(Checked):
             robot_of(self.task, self.design)
         for name in self.growth:
             require_one_of("growth", name, list(self.options))
+        if self.successes and not (self.scaled and self.algorithm == "sac" and not self.mirrored):
+            raise ValueError(
+                "successes must be False but for SAC with memories of scaled observations that are"
+                f" not mirrored, got True for {self.algorithm}"
+            )
+        if kind is OffPolicy:
+            imitation, n_steps = self.learner.imitation, self.learner.n_steps  # type: ignore[union-attr]
+            if imitation and not self.successes:
+                raise ValueError(f"learner.imitation must be 0 without successes, got {imitation}")
+            if n_steps > 1 and (self.mirrored or self.algorithm == "crossq"):
+                raise ValueError(
+                    f"learner.n_steps must be 1 for CrossQ and mirrored memories, got {n_steps}"
+                )
+        if self.successes and self.start == "random":
+            raise ValueError("successes must be False where no script is shown, got True")
         if self.residual and not task.legs:
             raise ValueError(
                 f"residual must be 0 for {self.task}, which has no gait, got {self.residual}"
@@ -205,10 +240,12 @@ class TrainConfig(Checked):
         if self.residual and self.start == "random":
             raise ValueError("start must be a gait where one is corrected, got 'random'")
         if not self.residual and self.start != "random":
-            if not task.legs or kind is OnPolicy or not self.scaled:
+            known = task.legs or (task.script_holds and self.start == "scripted")
+            if not known or kind is OnPolicy or not self.scaled:
                 raise ValueError(
-                    "start must be 'random' but for a task with legs and memories of scaled"
-                    f" observations, got {shown(self.start)} for {self.task} and {self.algorithm}"
+                    "start must be 'random' but for a task with legs, or with a script that tells"
+                    " temperatures, and memories of scaled observations, got"
+                    f" {shown(self.start)} for {self.task} and {self.algorithm}"
                 )
             if self.arguments.get("action", "temperature") != "temperature":
                 raise ValueError(
@@ -261,7 +298,7 @@ def default_config(task: str, algorithm: str | None = None, **change: Any) -> Tr
             steps=recipe.steps, action="power", options=recipe.options, start="scripted"
         )
     asked = {**change.pop("arguments", {})}
-    arguments = {"action": recipe.action} | asked
+    arguments = {"action": recipe.action, **recipe.arguments} | asked
     period = asked.get("control_period") or recipe.control_period
     if period is not None:
         arguments["control_period"] = period
@@ -283,9 +320,12 @@ def default_config(task: str, algorithm: str | None = None, **change: Any) -> Tr
         "centred": recipe.centred and change.get("start", recipe.start) != "random",
         "retold": recipe.mirrored and bool(growing),
         "growth": growing,
+        "successes": recipe.successes,
+        "practised": recipe.practised,
+        "limit": recipe.limit,
     }
-    if recipe.interval is not None:
-        common["interval"] = recipe.interval
+    own = {"interval": recipe.interval, "evaluation_episodes": recipe.episodes}
+    common |= {name: value for name, value in own.items() if value is not None}
     return TrainConfig(task=task, algorithm=algorithm, **common | change)
 
 
@@ -312,9 +352,12 @@ def described(config: TrainConfig) -> str:
         *(["left and right told the same"] if config.alike else []),
         *(["rewards from the gait's on"] if config.centred else []),
         *(["told with other commands"] if config.retold else []),
-        *([f"first steps by the gait '{config.start}'"] if config.start != "random" else []),
+        *([f"first steps by the gait '{config.start}'"] if config.start != "random" and task.legs
+          else ["first steps by the script"] if config.start != "random" else []),
+        *(["half of each batch what that did with success"] if config.successes else []),
         *(f"{name} grown in {steps} steps" for name, steps in config.growth.items()),
         *(f"{name} {value}" for name, value in config.options.items()),
+        *(f"{name} {value} practised" for name, value in config.practised.items()),
         f"{config.envs} environments", f"seed {config.seed}",
     ]  # fmt: skip
     text = ", ".join(words)

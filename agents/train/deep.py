@@ -37,17 +37,19 @@ from tca_mj.agents.policies.contracts import contract, differences
 from tca_mj.agents.progress import progress_bar
 from tca_mj.agents.rollout import earned, rollout
 from tca_mj.agents.train.config import TrainConfig
-from tca_mj.agents.train.demonstrations import demonstrate
+from tca_mj.agents.train.demonstrations import demonstrate, show
 from tca_mj.agents.train.learning_env import LearningEnv
 from tca_mj.agents.train.mirrored import mirrored_memory
 from tca_mj.agents.train.runs import CURVE, RunFolder, drawn
 from tca_mj.agents.train.sb3_env import TaskVecEnv, silence
+from tca_mj.agents.train.successes import ImitatingSAC, SuccessReplayBuffer
 from tca_mj.files import PART, claimed
-from tca_mj.registry import make
+from tca_mj.registry import make, task_class
 
 EVALUATIONS = "evaluations.csv"
 BEST, LAST = "best", "last"  # with the ending of their kind
 
+_WARM_UP = 2000  # gradient steps of each kind between a script's steps and the first own ones
 _FILM = 10.0  # length of the film of an episode that takes all its time [s]
 
 _LEARNERS: dict[str, Any] = {"ppo": PPO, "sac": SAC, "td3": TD3, "tqc": TQC, "crossq": CrossQ}
@@ -79,7 +81,7 @@ def train(
         OSError: If something cannot be written.
         KeyboardInterrupt: As it came; the same call goes on from the last interval.
     """
-    if config.start != "random":
+    if config.start != "random" and task_class(config.task).legs:
         first_gaits(config.task, config.start)  # before a file is touched
     with ExitStack() as ends:
         ends.enter_context(claimed(out))
@@ -163,10 +165,12 @@ class Run:
         self.best: tuple[float, SavedPolicy] | None = known["best"]
         self._gait = first_gait(config.task, config.start) if config.residual else None
         coarser = {} if config.timestep is None else {"timestep": config.timestep}
+        short = _shorter(config)
         tasks = TaskVecEnv.make(
             config.task, config.envs, reset_options=dict(config.options), scaled=config.scaled,
-            **config.made_with, **coarser,
+            **config.made_with, **coarser, **short,
         )  # fmt: skip
+        tasks.practised = dict(config.practised)
         self.env = LearningEnv(tasks, self._gait, config.residual, config.alike)
         if state is None:
             running = not config.scaled
@@ -179,14 +183,14 @@ class Run:
             self.normalise = pickle.loads(state["normalise"])
             self.normalise.set_venv(self.env)
             self.normalise.returns = state["returns"]
-            self.model = _LEARNERS[config.algorithm].load(
+            self.model = _kind(config).load(
                 io.BytesIO(state["model"]), self.normalise, device="cpu", force_reset=False
             )
             if state["replay"] is not None:
                 self.model.replay_buffer = pickle.loads(state["replay"])  # type: ignore[attr-defined]
             _set_generators(self.model, state["generators"])
         silence(self.model)
-        self.test_env: gym.Env[Any, Any] = make(config.task, **config.made_with)
+        self.test_env: gym.Env[Any, Any] = make(config.task, **config.made_with, **short)
         task: Any = self.test_env.unwrapped
         self._units = task.observation.units if config.scaled else None
         self._made_for = contract(self.test_env)
@@ -212,9 +216,15 @@ class Run:
         if config.start == "random" or config.residual:
             return
         self.begin()
-        gait = first_gaits(config.task, config.start)
+        tasks = self.env.venv.tasks.envs
         first = min(config.learner.learning_starts, config.steps)  # type: ignore[union-attr]
-        demonstrate(self.model, self.env.venv.tasks.envs, gait, first, config.seed, self.env.pairs)
+        if not tasks[0].legs:
+            show(self.model, tasks, first, config.seed)
+            if isinstance(self.model, ImitatingSAC):
+                self.model.warm_up(_WARM_UP)
+            return
+        gait = first_gaits(config.task, config.start)
+        demonstrate(self.model, tasks, gait, first, config.seed, self.env.pairs)
         if config.centred:
             memory: Any = self.model.replay_buffer  # type: ignore[attr-defined]
             earned = memory.rewards[: memory.size()]
@@ -242,12 +252,16 @@ class Run:
         seeds = drawn(config.seed, 1, config.evaluation_episodes)
         env, policy = self.test_env, saved.make(self.test_env)
         found = [earned(rollout(env, policy, seed=s, options=config.options)) for s in seeds]
+        if config.successes:
+            gamma = config.learner.gamma
+            found = [one | {"worth": one["return"] * gamma ** one["length"]} for one in found]
         row = {"steps": float(self.model.num_timesteps)}
         row |= {name: float(np.mean([each[name] for each in found])) for name in found[0]}
         self.evaluations.append(row)
         self._show("evaluation", row)
-        if self.best is None or row["return"] > self.best[0]:
-            self.best = row["return"], saved
+        score = row.get("worth", row["return"])
+        if self.best is None or score > self.best[0]:
+            self.best = score, saved
             for kind in (RECORDING, VIDEO):  # they would show another policy
                 (self.folder.path / kind.replace("rollout", BEST)).unlink(missing_ok=True)
 
@@ -350,7 +364,7 @@ def learner(config: TrainConfig, env: VecEnv) -> BaseAlgorithm:
         config: The settings.
         env: What it learns in; with mirrored memories round a ``TaskVecEnv``.
     """
-    kind, settings = _LEARNERS[config.algorithm], asdict(config.learner)
+    kind, settings = _kind(config), asdict(config.learner)
     network: dict[str, Any] = {"net_arch": list(settings["hidden"])}
     if "log_std_init" in settings:
         network["log_std_init"] = settings["log_std_init"]
@@ -364,12 +378,31 @@ def learner(config: TrainConfig, env: VecEnv) -> BaseAlgorithm:
         settings |= mirrored_memory(
             env.unwrapped, retold=config.retold, alike=config.alike, seed=config.seed
         )
+    if config.successes:
+        settings["replay_buffer_class"] = SuccessReplayBuffer
+        settings["replay_buffer_kwargs"] = {
+            "n_steps": settings.pop("n_steps"), "gamma": settings["gamma"],
+        }  # fmt: skip
     known = inspect.signature(kind).parameters
     model: BaseAlgorithm = kind(
         "MlpPolicy", env, seed=config.seed, device="cpu", policy_kwargs=network,
         **{name: value for name, value in settings.items() if name in known},
     )  # fmt: skip
+    if isinstance(model, ImitatingSAC):
+        model.imitation = settings["imitation"]
     return model
+
+
+def _kind(config: TrainConfig) -> Any:
+    return ImitatingSAC if config.successes else _LEARNERS[config.algorithm]
+
+
+def _shorter(config: TrainConfig) -> dict[str, Any]:
+    """How long episodes are, where the task does not say it."""
+    if config.limit is None:
+        return {}
+    period = config.arguments.get("control_period") or task_class(config.task).control_period
+    return {"max_episode_steps": max(1, round(config.limit / period))}
 
 
 def exported(

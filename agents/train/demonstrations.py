@@ -1,4 +1,4 @@
-"""First memories of a learner: what a gait does, told as the temperatures that it holds."""
+"""First memories of a learner: what a gait or a script does, told as temperatures to hold."""
 
 from __future__ import annotations
 
@@ -9,13 +9,17 @@ import numpy as np
 from numpy.typing import NDArray
 from stable_baselines3.common.base_class import BaseAlgorithm
 
+from tca_mj.agents.policies.actors import script_of
 from tca_mj.agents.train.mirrored import MirroredReplayBuffer
+from tca_mj.agents.train.successes import SuccessReplayBuffer
 from tca_mj.control import Gait
 from tca_mj.envs.task import SimulatedTask
 
 # What each episode's gait is drawn from, so that memories know more than one way. Estimates: the
 # share by which it is faster or slower, and the spread of what is added to actions from -1 to 1.
 _HURRY, _NOISE = 0.1, 0.15
+# The same of a script, one of them drawn for each episode: some go wrong.
+_SPREADS = (0.0, 0.045, 0.09)
 
 
 def demonstrate(
@@ -36,8 +40,6 @@ def demonstrate(
         pairs: Which number of an action each TCA gets, which asks for the mean of what the gait
             does; None where each has its own.
     """
-    env: Any = model.get_env()
-    memory: Any = model.replay_buffer  # type: ignore[attr-defined]
     random = np.random.default_rng((seed, 2))
     phase, pace = np.zeros(len(tasks)), np.ones(len(tasks))
     gaits: dict[int, Gait] = {}
@@ -46,17 +48,55 @@ def demonstrate(
         phase[i], pace[i] = random.uniform(), random.uniform(1.0 - _HURRY, 1.0 + _HURRY)
         gaits[i] = gait(tasks[i])
 
-    seen = env.reset()
-    for i in range(len(tasks)):
-        begin(i)
-    while model.num_timesteps < steps:
+    def act() -> NDArray[np.float64]:
         actions = np.stack([
             _asked(task, gaits[i], phase[i], pace[i]) for i, task in enumerate(tasks)
         ])  # fmt: skip
         if pairs is not None:
             actions = np.stack([actions[:, pairs == k].mean(axis=1) for k in np.unique(pairs)], 1)
-        actions += _NOISE * random.standard_normal(actions.shape)
-        actions = np.clip(actions, -1.0, 1.0).astype(np.float32)
+        return actions + _NOISE * random.standard_normal(actions.shape)
+
+    _live(model, len(tasks), begin, act, steps)
+
+
+def show(model: BaseAlgorithm, tasks: list[SimulatedTask], steps: int, seed: int) -> None:
+    """The same with steps of the task's script, which sees and does what a learner does.
+
+    Actions are off by a noise whose spread is drawn for each episode.
+
+    Args:
+        model, tasks, steps, seed: As for ``demonstrate``.
+    """
+    random = np.random.default_rng((seed, 2))
+    scripts = [script_of(task) for task in tasks]
+    spread = np.zeros((len(tasks), 1))
+
+    def begin(i: int) -> None:
+        scripts[i].reset()
+        spread[i] = random.choice(_SPREADS)
+
+    def act() -> NDArray[np.float64]:
+        each = zip(scripts, tasks, strict=True)
+        actions = np.stack([script.act(task.seen()) for script, task in each])
+        return actions + spread * random.standard_normal(actions.shape)
+
+    _live(model, len(tasks), begin, act, steps)
+
+
+def _live(
+    model: BaseAlgorithm, count: int, begin: Callable[[int], None],
+    act: Callable[[], NDArray[np.float64]], steps: int,
+) -> None:  # fmt: skip
+    """Fills the memory with what ``act`` does in ``count`` tasks whose episodes ``begin``."""
+    env: Any = model.get_env()
+    memory: Any = model.replay_buffer  # type: ignore[attr-defined]
+    if isinstance(memory, SuccessReplayBuffer):
+        memory.begin(showing=True)
+    seen = env.reset()
+    for i in range(count):
+        begin(i)
+    while model.num_timesteps < steps:
+        actions = np.clip(act(), -1.0, 1.0).astype(np.float32)
         after, rewards, dones, infos = env.step(actions)
         last = after.copy()
         for i in np.flatnonzero(dones).tolist():
@@ -64,8 +104,8 @@ def demonstrate(
             begin(i)
         memory.add(seen, last, actions, rewards, dones, infos)
         seen = after
-        model.num_timesteps += len(tasks)
-    if isinstance(memory, MirroredReplayBuffer):
+        model.num_timesteps += count
+    if isinstance(memory, MirroredReplayBuffer | SuccessReplayBuffer):
         memory.begin()  # the learner resets the tasks
 
 

@@ -41,6 +41,7 @@ class TaskVecEnv(VecEnv):
     Attributes:
         tasks: The vector environment.
         scaled: Whether observations are scaled.
+        practised: Options, on top of those, that every third task is reset with: what is hard.
     """
 
     @door
@@ -55,6 +56,7 @@ class TaskVecEnv(VecEnv):
             ValueError: If an argument is not of its kind.
         """
         self.tasks, self.scaled = tasks, scaled
+        self.practised: dict[str, Any] = {}
         table = tasks.envs[0].observation
         self._seen = table.scaled if scaled else np.asarray
         self._actions = np.zeros(tasks.action_space.shape or (), dtype=np.float32)
@@ -84,7 +86,7 @@ class TaskVecEnv(VecEnv):
     def reset(self) -> NDArray[np.float32]:
         """Begins new episodes with the seeds and options that were set for this once."""
         begun = [
-            self.tasks.restart(i, seed=seed, options=options or None)
+            self.tasks.restart(i, seed=seed, options=options or self._drill(i))
             for i, (seed, options) in enumerate(zip(self._seeds, self._options, strict=True))
         ]
         self.reset_infos = [info for _, info in begun]
@@ -107,10 +109,16 @@ class TaskVecEnv(VecEnv):
             info["TimeLimit.truncated"] = truncated and not terminated
             if dones[i]:
                 info["terminal_observation"] = self._seen(observation)
-                observation, self.reset_infos[i] = self.tasks.restart(i)
+                observation, self.reset_infos[i] = self.tasks.restart(i, options=self._drill(i))
             observations.append(observation)
             infos.append(info)
         return self._seen(np.stack(observations)), rewards, dones, infos
+
+    def _drill(self, i: int) -> dict[str, Any] | None:
+        """Options of the next reset of a task; None for those of every reset."""
+        if not self.practised or i % 3:
+            return None
+        return {**(self.tasks.reset_options or {}), **self.practised}
 
     def close(self) -> None:
         """Closes the tasks."""

@@ -1,0 +1,219 @@
+"""What a script did with success: half of each batch is from there, and it is imitated."""
+
+from contextlib import closing, suppress
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+from gymnasium import spaces
+
+from tca_mj.agents.policies import SavedPolicy, load_policy
+from tca_mj.agents.train.config import OffPolicy, TrainConfig, default_config
+from tca_mj.agents.train.deep import Run, train
+from tca_mj.agents.train.learning_env import LearningEnv
+from tca_mj.agents.train.runs import RunFolder
+from tca_mj.agents.train.sb3_env import TaskVecEnv
+from tca_mj.agents.train.successes import SuccessReplayBuffer
+from tca_mj.registry import make
+
+ARM = "TCA/ArmPickPlace-v0"
+GAMMA, STEPS = 0.9, 3
+
+
+def memory(**change):
+    box = spaces.Box(-1.0, 1.0, (2,), np.float32)
+    given = {"n_envs": 2, "n_steps": STEPS, "gamma": GAMMA}
+    return SuccessReplayBuffer(50, box, spaces.Box(-1.0, 1.0, (1,), np.float32), **given | change)
+
+
+def lived(buffer, length=5):
+    """Two episodes side by side: what is seen and done counts up, the second one succeeds."""
+    for k in range(length):
+        last = k == length - 1
+        seen = np.array([[k, 0.0], [k, 1.0]], np.float32)
+        buffer.add(
+            seen, seen + [[1.0, 0.0]], np.array([[k], [10 + k]], np.float32),
+            np.array([k, 100.0 + k]), np.array([last, last]),
+            [{"success": False, "TimeLimit.truncated": last}, {"success": last}],
+        )  # fmt: skip
+
+
+def test_half_of_a_batch_is_what_the_script_did_with_success():
+    buffer = memory()
+    buffer.begin(showing=True)
+    lived(buffer)
+    buffer.begin()
+    assert (buffer.size(), buffer.shown.size) == (10, 5)
+    lived(buffer)  # what a learner does is not shown, with success or without
+    assert (buffer.size(), buffer.shown.size) == (20, 5)
+    np.random.seed(0)
+    batch = buffer.sample(64)
+    which = batch.observations[:, 1].numpy()
+    assert (which[:32] == 1.0).all() and 0.2 < which[32:].mean() < 0.8
+    assert set(batch.actions[:32, 0].tolist()) == {10.0, 11.0, 12.0, 13.0, 14.0}
+
+
+def test_if_nothing_has_succeeded_a_batch_is_of_all_memories():
+    buffer = memory(n_envs=1)
+    buffer.begin(showing=True)
+    for k in range(4):
+        seen = np.full((1, 2), k, np.float32)
+        ended = np.array([k == 3])
+        buffer.add(seen, seen + 1.0, seen[:, :1], np.zeros(1), ended, [{"success": False}])
+        assert buffer.size() == (4 if k == 3 else 0)  # when it is over
+    assert buffer.sample(6).observations.shape == (6, 2)
+
+
+def test_a_memory_tells_what_some_steps_have_earned():
+    buffer = memory()
+    lived(buffer)
+    batch = buffer.parts(buffer.lived.rows[: buffer.size()])
+    for seen, after, done, reward, discount in zip(
+        batch.observations.numpy(), batch.next_observations.numpy(), batch.dones[:, 0].tolist(),
+        batch.rewards[:, 0].tolist(), batch.discounts[:, 0].tolist(), strict=True,
+    ):  # fmt: skip
+        k, success = int(seen[0]), seen[1] == 1.0
+        told = range(k, min(k + STEPS, 5))
+        assert reward == pytest.approx(sum(GAMMA**(j - k) * (j + 100.0 * success) for j in told))
+        assert discount == pytest.approx(GAMMA ** len(told))
+        assert after.tolist() == [told[-1] + 1.0, seen[1]]
+        # Who ran out of time could have gone on.
+        assert done == float(success and told[-1] == 4)
+
+
+def tiny(**change):
+    """The recipe, so small that it ends within seconds: an episode is cut off after 0.6 s."""
+    config = default_config(ARM, envs=2)
+    learner = replace(
+        config.learner, learning_starts=8, gradient_steps=2, batch_size=8, hidden=(8,),
+        buffer_size=60,
+    )  # fmt: skip
+    given = {"learner": learner, "steps": 20, "interval": 10, "evaluation_episodes": 1,
+             "limit": 0.6}  # fmt: skip
+    return replace(config, **given | change)
+
+
+@pytest.fixture
+def quick(without_board, monkeypatch):
+    """No recordings, a short warm-up, and what is cut off has succeeded, so that it is imitated."""
+    monkeypatch.setattr("tca_mj.agents.train.deep.record", lambda *_, **__: None)
+    monkeypatch.setattr("tca_mj.agents.train.deep._WARM_UP", 3)
+    add = SuccessReplayBuffer.add
+
+    def pleased(self, obs, next_obs, action, reward, done, infos):
+        infos = [{**info, "success": True} for info in infos]
+        add(self, obs, next_obs, action, reward, done, infos)
+
+    monkeypatch.setattr(SuccessReplayBuffer, "add", pleased)
+
+
+def written(folder):
+    return {name: (folder / name).read_bytes() for name in ("curve.csv", "evaluations.csv")} | {
+        name: [a.tobytes() for a in SavedPolicy.read(folder / name).network.weights]
+        for name in ("best.npz", "last.npz")
+    }
+
+
+@pytest.mark.usefixtures("quick")
+def test_a_run_that_is_broken_off_ends_as_one_that_is_not(tmp_path, monkeypatch):
+    config = tiny()
+    saved = train(config, tmp_path / "whole", progress=False, video=False)
+    assert saved.arguments == {"action": "temperature", "control_period": 0.2, "offsets": True}
+    env = make(ARM, **saved.arguments)
+    policy = load_policy(tmp_path / "whole" / "best.npz", env)
+    assert env.action_space.contains(policy.act(env.reset(seed=0)[0]))
+    env.close()
+    step, left = LearningEnv.step_wait, 0
+
+    def breaking(self):
+        nonlocal left
+        left -= 1
+        if left < 0:
+            raise KeyboardInterrupt
+        return step(self)
+
+    monkeypatch.setattr(LearningEnv, "step_wait", breaking)
+    for left in (2, 7, 100):  # noqa: B007  # amid the script's steps, amid an interval
+        with suppress(KeyboardInterrupt):
+            train(config, tmp_path / "parts", progress=False, video=False)
+        torch.manual_seed(99)  # a new process would be elsewhere
+        np.random.seed(99)
+    assert written(tmp_path / "parts") == written(tmp_path / "whole")
+
+
+@pytest.mark.usefixtures("quick")
+def test_the_script_makes_the_first_steps_and_is_imitated(tmp_path):
+    """After a warm-up the policy does in what it has seen what the script did there."""
+    config = tiny(learner=replace(tiny().learner, learning_starts=60, batch_size=128))
+    with closing(Run(config, RunFolder(tmp_path, config, ""))) as run:
+        assert not any(isinstance(m, torch.nn.LayerNorm) for m in run.model.actor.modules())
+        assert sum(isinstance(m, torch.nn.LayerNorm) for m in run.model.critic.modules()) == 2
+        run.demonstrate()
+        model = run.model
+        memory = model.replay_buffer
+        assert memory.shown.size and not memory.showing
+        batch = memory.parts(memory.shown.rows[: memory.shown.size])
+        assert (batch.dones == 0.0).all()  # the script is under way when time is up
+
+        def off():
+            own = model.actor(batch.observations, deterministic=True)
+            return float(((own - batch.actions) ** 2).mean().detach())
+
+        before = off()
+        model.warm_up(400)
+        assert off() < 0.3 * before
+    opened = batch.actions[:, 4] > -1.0
+    assert float(opened.float().mean()) > 0.8  # the script heats the gripper from the start
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"scaled": False}, "successes must be False but for SAC"),
+        ({"algorithm": "td3"}, "successes must be False but for SAC"),
+        ({"successes": False}, "learner.imitation must be 0 without successes, got 8"),
+        ({"start": "random"}, "successes must be False where no script is shown"),
+        ({"start": "trot"}, "start must be 'random' but for a task with legs"),
+        ({"limit": 0.0}, "limit must be finite and above 0"),
+        ({"arguments": {"action": "power"}}, r"arguments\['action'\] must be 'temperature'"),
+    ],
+)
+def test_impossible_settings_are_refused(change, message):
+    with pytest.raises(ValueError, match=message):
+        replace(default_config(ARM), **change)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"n_steps": 0}, "n_steps must be"),
+        ({"imitation": -1.0}, "imitation must be"),
+        ({"target_entropy": "auto_1"}, "target_entropy must be"),
+    ],
+)
+def test_impossible_learners_are_refused(change, message):
+    with pytest.raises(ValueError, match=message):
+        OffPolicy(**change)
+
+
+def test_several_steps_are_told_by_unmirrored_memories_only():
+    with pytest.raises(ValueError, match="learner.n_steps must be 1"):
+        TrainConfig(
+            task="TCA/TetrapodWalk-v0", algorithm="sac", learner=OffPolicy(n_steps=2), scaled=True,
+            mirrored=True,
+        )  # fmt: skip
+
+
+def test_every_third_environment_practises():
+    tasks = TaskVecEnv.make(ARM, 4, max_episode_steps=1)
+    tasks.practised = {"object": "pcb", "object_yaw": 2.2}
+    tasks.seed(0)
+    tasks.reset()
+    still = np.tile(tasks.tasks.envs[0].action.still, (4, 1))
+    for _ in range(2):  # also in the episodes that follow
+        yaws = [float(np.arctan2(*env.seen()[[32, 29]]) * 2.0) for env in tasks.tasks.envs]
+        assert [abs(yaw - 2.2) < 1e-5 for yaw in yaws] == [True, False, False, True]
+        assert [tasks.tasks.envs[i].object for i in (0, 3)] == ["pcb", "pcb"]
+        tasks.step(still)
+    tasks.close()
