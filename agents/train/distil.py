@@ -88,7 +88,7 @@ class DistilConfig(Checked):
             turns, and in a round as many steps as an episode takes.
         options: Options of every reset besides the teachers'.
         arguments: Values of arguments that the task is made with besides the teachers'; with
-            several there are as many environments with each.
+            several there are as many environments with each, and the policy is one for the first.
         timestep: Physics time step; None for the task's own [s].
         noise: Standard deviation of what is added to the actions of every second environment, 0 to
             1 [1].
@@ -231,8 +231,10 @@ class _Lesson:
         self.mirrored = self.observation.symmetric and self.action.symmetric
 
     def _accepted(self, saved: list[SavedPolicy]) -> dict[str, Any]:
-        """The contract of the task, to which the teachers' fit but for how they scale."""
-        env = make(self.config.task, disable_env_checker=True, **self.arguments)
+        """The contract of the task, with the first value of each argument, to which the teachers'
+        fit but for how they scale."""
+        first = {name: values[0] for name, values in self.config.arguments.items()}
+        env = make(self.config.task, disable_env_checker=True, **self.arguments, **first)
         found, options = contract(env), env.unwrapped.options
         env.close()
         given = {name: _unscaled(name, part) for name, part in found.items()}
