@@ -28,6 +28,8 @@ PRINTED = {
     "beyond": "beyond_page.py --tables",
     "bistable": "bistable_page.py --tables",
     "bistable-gripper": "bistable_gripper_page.py --tables",
+    "certificate": "tetrapod_certificate.py rails bending legs gaits",
+    "coil-bvp": "conical_tca.py --table",
     "finger": "finger_page.py --tables",
     "grasp": "grasp_page.py --tables",
     "learned-model": "learned_model_page.py --tables",
@@ -41,8 +43,9 @@ PRINTED = {
     "warnings": "convexity_warnings.py",
 }
 ELSEWHERE = {
-    "bistable": ("bistable", "jump"), "nodes": ("soft-bodies",), "rods": ("tetrapod-model",),
-    "walk-limit": ("tetrapod",), "warnings": ("tetrapod",),
+    "bistable": ("bistable", "jump"), "certificate": ("tetrapod-model",),
+    "nodes": ("soft-bodies",), "rods": ("tetrapod-model",), "walk-limit": ("tetrapod",),
+    "warnings": ("tetrapod",),
 }  # fmt: skip
 TABLE = re.compile(r"^\|.*\n\|[-:| ]+\|\n(?:\|.*\n)*", re.MULTILINE)
 

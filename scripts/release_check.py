@@ -135,6 +135,18 @@ def written(results: dict[str, Any]) -> str:
     return pages.page(MARK, pages.table(heads, rows), "\n".join(made)) + "\n"
 
 
+def read_back(page: str) -> dict[str, Any]:
+    """What the table of a page says, so that rows of another checkout's checks stay."""
+    row = re.compile(
+        r"^\| ([a-z ]+) \| `.*?` \| (\S+) \| ([\d-]+) \| (\d+) s \| (.*) \|$", re.MULTILINE
+    )
+    return {
+        name: {"held": held == "held", "seconds": int(seconds), "on": on,
+               "said": said.replace("\\|", "|")}
+        for name, held, on, seconds, said in row.findall(page)
+    }  # fmt: skip
+
+
 def main() -> int:
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("checks", nargs="*", help="names of checks; without any, all")
@@ -158,10 +170,11 @@ def main() -> int:
         for name in names:
             found = tried(name)
             # Read anew: another call may have tried other checks meanwhile.
-            results = json.loads(kept.read_text(encoding="utf-8")) if kept.exists() else {}
+            page = PAGE.read_text(encoding="utf-8")
+            results = json.loads(kept.read_text("utf-8")) if kept.exists() else read_back(page)
             results[name] = found
             write_whole(kept, json.dumps(results, indent=1).encode())
-            head = PAGE.read_text(encoding="utf-8").partition(MARK)[0]
+            head = page.partition(MARK)[0]
             write_whole(PAGE, f"{head}{written(results)}".encode())
         return 0 if all(results[name]["held"] for name in names) else 1
     return 0

@@ -1,6 +1,7 @@
 """Evaluates every agent in every task and writes docs/results.md, with its data and its pictures.
 
-The table of docs/training.md on the policies that come with the package is written, too.
+Tables of docs/training.md, on the policies that come with the package, and of docs/tetrapod.md, on
+the scripts of the gaits, are written, too.
 
     python scripts/results_page.py                            what is missing, then the page
     python scripts/results_page.py --tasks TCA/BendReach-v0   of one task; the page of all there is
@@ -24,6 +25,7 @@ from typing import Any
 from tca_mj.agents.evaluate import METRICS, Evaluation, cell, evaluate, figures
 from tca_mj.agents.finished import EPISODES, kept
 from tca_mj.agents.policies import SavedPolicy, shipped
+from tca_mj.envs.gaits import TASKS as PUBLISHED
 from tca_mj.pages import table as markdown
 from tca_mj.pages import write_between
 from tca_mj.registry import TASKS, find_task, task_class
@@ -32,7 +34,8 @@ ROOT = Path(__file__).resolve().parent.parent
 PAGE, DATA = ROOT / "docs" / "results.md", ROOT / "docs" / "results.json"
 PICTURES = ROOT / "docs" / "pictures"
 COURSE = "TCA/TetrapodCourse-v0"
-TRAINING, MARK = ROOT / "docs" / "training.md", "scripts/results_page.py: shipped"
+MARK = "scripts/results_page.py"
+TRAINING, TETRAPOD = ROOT / "docs" / "training.md", ROOT / "docs" / "tetrapod.md"
 GOALS = [task.id for task in TASKS if "Tetrapod" not in task.id]  # they are reached or not
 
 # The robot, and what it is called on the page. Chance and nobody act on the first alone.
@@ -251,6 +254,28 @@ def shipped_table(results: dict[str, dict[str, dict[str, Any]]]) -> list[str]:
     return markdown(heads, rows)
 
 
+def scripts_table(results: dict[str, dict[str, dict[str, Any]]]) -> list[str]:
+    """What the scripts of the gaits do, beside what is published."""
+    rows = []
+    for task in TASKS:
+        if "gait" not in task.kwargs:
+            continue
+        gait = task.kwargs["gait"]
+        found = results[task.id]["scripted"]["nominal"]["figures"]
+        speed, far = found["speed"], found["drift"]["most"]
+        share = 100.0 * far / (speed["mean"] * find_task(task.id).max_episode_steps * 0.1)
+        rows.append([
+            gait, cell("speed", speed),
+            f"{100.0 * speed['mean'] / PUBLISHED[gait].speed:.0f} %",
+            f"at most {share:.1f} %", f"{found['peak_temperature']['mean']:.0f}",
+            f"{found['peak_tension']['mean']:.2f}",
+            f"{1e-3 * found['energy_per_metre']['mean']:.1f}",
+        ])  # fmt: skip
+    heads = ["gait", "speed (95 % interval) [mm/s]", "over the published", "drift over distance",
+             "hottest TCA [°C]", "largest tension [N]", "energy per metre [kJ/m]"]  # fmt: skip
+    return markdown(heads, rows)
+
+
 def main(argv: list[str] | None = None) -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     known = [task.id for task in TASKS]
@@ -281,7 +306,8 @@ def main(argv: list[str] | None = None) -> None:
         results.setdefault(task, {}).setdefault(policy, {})[condition] = entry
     DATA.write_text(json.dumps(results, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
     PAGE.write_text(page(results), encoding="utf-8")
-    write_between(TRAINING, MARK, shipped_table(results))
+    write_between(TRAINING, f"{MARK}: shipped", shipped_table(results))
+    write_between(TETRAPOD, f"{MARK}: scripts", scripts_table(results))
     print(f"{PAGE}\n{DATA}")
 
 

@@ -130,6 +130,18 @@ def test_commands_of_the_pages_are_taken():
     assert len(found) > 150 and wrong == []
 
 
+def test_no_two_runs_go_into_the_same_folder():
+    """Who types the pages one after the other would be refused."""
+    runs = {}
+    for page, words, whole in typed():
+        if whole and words[:2] in (["tca-mj", "train"], ["tca-mj", "sweep"]) and "--out" in words:
+            if page.name.startswith(("tutorial", "own-robot")):
+                continue  # in a folder of their own
+            out = words[words.index("--out") + 1]
+            assert runs.setdefault(out, words) == words, (page.name, words)
+    assert len(runs) > 5
+
+
 def test_everything_typed_is_known():
     """Else a command of another kind would be looked at by nobody."""
     firsts = {words[0].rpartition("/")[2] for _, words, _ in typed()}

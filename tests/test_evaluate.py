@@ -210,6 +210,9 @@ def test_an_unknown_policy_is_said_before_anything_runs(tmp_path):
         evaluate(replace(SHORT, policy="nobody"), out=tmp_path / "new", progress=False)
     with pytest.raises(FileNotFoundError, match=r"none of best\.json, best\.npz"):
         evaluate(replace(SHORT, policy=str(tmp_path)), out=tmp_path / "new", progress=False)
+    (tmp_path / "last.npz").touch()
+    with pytest.raises(FileNotFoundError, match=r"it stands at .*last\.npz"):
+        evaluate(replace(SHORT, policy=str(tmp_path)), out=tmp_path / "new", progress=False)
     saved(tmp_path)
     with pytest.raises(ValueError, match="must be a policy for TCA/BendReach-v0, got "):
         evaluate(replace(SHORT, policy=str(tmp_path)), out=tmp_path / "new", progress=False)

@@ -45,6 +45,8 @@ def test_the_table_tells_what_failed_and_what_was_not_run():
     assert "**failed** | 2026-01-01 | 3 s | 1 failed \\| 2 passed |" in table
     assert table.count("| not run |") == len(release_check.CHECKS) - 1
     assert release_check.MARK in release_check.PAGE.read_text(encoding="utf-8")
+    assert release_check.read_back(table) == {"build": found}
+    assert release_check.read_back(release_check.PAGE.read_text(encoding="utf-8"))
 
 
 def test_an_unknown_check_is_refused(monkeypatch, capsys):

@@ -27,6 +27,7 @@ from tca_mj.agents.train.deep import Run, exported, learner, train
 from tca_mj.agents.train.learning_env import LearningEnv
 from tca_mj.agents.train.runs import RunFolder
 from tca_mj.agents.train.sb3_env import TaskVecEnv
+from tca_mj.agents.train.search import SearchConfig, search
 from tca_mj.cli import main
 from tca_mj.envs import gaits
 from tca_mj.registry import TASKS
@@ -234,6 +235,8 @@ def test_a_correction_of_a_gait_goes_on_too(tmp_path, monkeypatch):
     assert env.action_space.contains(policy.act(env.reset(seed=0)[0]))
     with pytest.raises(ValueError, match=r"holds a run with residual 10\.0, not 20\.0"):
         train(replace(config, residual=20.0), tmp_path / "parts", progress=False)
+    with pytest.raises(ValueError, match=r"algorithm \w+, not cma; take another folder"):
+        search(SearchConfig(task=WALK), tmp_path / "parts", progress=False)
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="needs signals")

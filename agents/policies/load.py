@@ -23,6 +23,7 @@ from tca_mj.registry import find_task, make
 
 ZIP = ".zip"  # of a model of Stable-Baselines3
 BEST = ("best.json", "best.npz", "best_model.zip")  # the last by its EvalCallback
+LAST = ("last.json", "last.npz")  # where a run stands
 
 
 @door
@@ -150,7 +151,9 @@ def find(source: str | Path) -> Path:
     if path.is_dir():
         best = next((path / name for name in BEST if (path / name).is_file()), None)
         if best is None:
-            raise FileNotFoundError(f"none of {', '.join(BEST)} in {source}")
+            last = [f"{path / name}" for name in LAST if (path / name).is_file()]
+            hint = f"; the run has judged none yet, it stands at {last[0]}" if last else ""
+            raise FileNotFoundError(f"none of {', '.join(BEST)} in {source}{hint}")
         return best
     if str(source) in known:
         return known[str(source)]

@@ -64,8 +64,13 @@ class RunFolder:
                 for name in sorted(held.keys() | settings.keys())
                 if held.get(name) != settings.get(name) and name != "steps"
             ]
+            kinds = [str(each.get("algorithm", "cma")) for each in (held, settings)]
+            if kinds[0] != kinds[1]:  # of which no setting means the same
+                other = [f"algorithm {kinds[0]:.80}, not {kinds[1]}"]
             if other:
-                raise ValueError(f"{file} holds a run with {'; '.join(other[:5])}")
+                raise ValueError(
+                    f"{file} holds a run with {'; '.join(other[:5])}; take another folder"
+                )
         made = {"versions": versions(*LIBRARIES), "machine": machine()}
         write_json(file, {"config": settings, "command": command, **made})
 
