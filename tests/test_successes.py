@@ -163,6 +163,11 @@ def test_the_script_makes_the_first_steps_and_is_imitated(tmp_path):
         before = off()
         model.warm_up(400)
         assert off() < 0.3 * before
+        model.train(20, 8)
+        mean, now = model.averaged["mu.weight"], model.actor.mu.weight
+        assert not torch.equal(mean, now)
+        np.testing.assert_array_equal(run.policy().network.weights[-1], mean.numpy())
+        assert torch.equal(now, model.actor.mu.weight)  # writing a policy changes nothing
     opened = batch.actions[:, 4] > -1.0
     assert float(opened.float().mean()) > 0.8  # the script heats the gripper from the start
 

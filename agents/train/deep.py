@@ -13,7 +13,7 @@ import os
 import pickle
 import random
 import shutil
-from contextlib import ExitStack, closing
+from contextlib import ExitStack, closing, nullcontext
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -186,6 +186,8 @@ class Run:
             self.model = _kind(config).load(
                 io.BytesIO(state["model"]), self.normalise, device="cpu", force_reset=False
             )
+            if isinstance(self.model, ImitatingSAC):
+                self.model.averaged = state["averaged"]
             if state["replay"] is not None:
                 self.model.replay_buffer = pickle.loads(state["replay"])  # type: ignore[attr-defined]
             _set_generators(self.model, state["generators"])
@@ -295,6 +297,7 @@ class Run:
         self.folder.save(
             {
                 "model": buffer.getvalue(),
+                "averaged": getattr(model, "averaged", None),
                 "replay": None if replay is None else pickle.dumps(replay),
                 "normalise": pickle.dumps(self.normalise),
                 "returns": self.normalise.returns,
@@ -425,7 +428,8 @@ def exported(
             clip=float(normalise.clip_obs), epsilon=float(normalise.epsilon),
         )  # fmt: skip
     buffer = io.BytesIO()
-    model.save(buffer)
+    with model.at_its_mean() if isinstance(model, ImitatingSAC) else nullcontext():
+        model.save(buffer)
     network = Model.parsed(buffer.getvalue(), "").preprocessed(units, statistics)
     if pairs is None:
         return network

@@ -8,6 +8,8 @@ are.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
@@ -19,6 +21,7 @@ from stable_baselines3.common.torch_layers import create_mlp
 from stable_baselines3.common.type_aliases import ReplayBufferSamples
 
 _LAST_IMITATION = 0.02  # share of its weight that is left at the end, an estimate
+_AVERAGING = 1e-4  # share by which the mean follows the actor, with each update; an estimate
 _FIRST_SPREAD = -3.0  # logarithm of the standard deviation of the first actions, an estimate
 
 
@@ -141,31 +144,36 @@ class ImitatingSAC(SAC):
     """SAC that does, too, what it was shown: less and less.
 
     The layers of its critics are normalised, which lets them learn more often from a memory, and
-    its first actions vary little. It remembers in a ``SuccessReplayBuffer``.
+    its first actions vary little. It remembers in a ``SuccessReplayBuffer``. What it is good for is
+    the mean of what its actor was lately, which fails far less often than the actor of any moment.
 
     Attributes:
+        averaged: That mean, the actor's tensors by name; empty before anything is learned.
         imitation: Weight of the squared distance from actions that were shown, in units of the
             reward, at the beginning [1].
     """
 
     imitation: float = 0.0
+    averaged: dict[str, torch.Tensor]
 
     def _setup_model(self) -> None:
         super()._setup_model()
+        self.averaged = {}
         for critic in (self.critic, self.critic_target):
+            widths: Any = self.policy.net_arch
             for i, network in enumerate(critic.q_networks):
-                first, *_, last = (m for m in network if isinstance(m, torch.nn.Linear))
+                first: Any = next(iter(network.children()))
                 layers = create_mlp(
-                    first.in_features, last.out_features, list(self.policy.net_arch),
-                    post_linear_modules=[torch.nn.LayerNorm],
-                )  # fmt: skip
+                    first.in_features, 1, list(widths), post_linear_modules=[torch.nn.LayerNorm]
+                )
                 critic.q_networks[i] = torch.nn.Sequential(*layers).to(self.device)
                 setattr(critic, f"qf{i}", critic.q_networks[i])
         self.critic_target.load_state_dict(self.critic.state_dict())
         self.critic.optimizer = torch.optim.Adam(self.critic.parameters(), self.lr_schedule(1))
+        spread: Any = self.actor.log_std
         with torch.no_grad():
-            self.actor.log_std.weight.mul_(0.01)
-            self.actor.log_std.bias.fill_(_FIRST_SPREAD)
+            spread.weight.mul_(0.01)
+            spread.bias.fill_(_FIRST_SPREAD)
 
     def warm_up(self, steps: int) -> None:
         """Learns from what is remembered to act likewise, and then what that is worth."""
@@ -182,6 +190,24 @@ class ImitatingSAC(SAC):
         for _ in range(gradient_steps):
             super().train(1, batch_size)
             self._imitate(batch_size // 2)
+            now = self.actor.state_dict()
+            if not self.averaged:
+                self.averaged = {name: row.clone() for name, row in now.items()}
+            for name, row in self.averaged.items():
+                row.lerp_(now[name], _AVERAGING)
+
+    @contextmanager
+    def at_its_mean(self) -> Iterator[None]:
+        """Meanwhile the actor is its mean."""
+        now = {name: row.clone() for name, row in self.actor.state_dict().items()}
+        self.actor.load_state_dict(self.averaged or now)
+        try:
+            yield
+        finally:
+            self.actor.load_state_dict(now)
+
+    def _excluded_save_params(self) -> list[str]:
+        return [*super()._excluded_save_params(), "averaged"]
 
     def _imitate(self, count: int) -> None:
         memory: Any = self.replay_buffer
