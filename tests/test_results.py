@@ -77,3 +77,17 @@ def test_the_page_of_gaits_is_what_its_script_makes_of_the_data():
     for found in results.values():
         assert "\n".join(script["table"](script["HEADS"], script["rows_of"](found))) in page
         assert len(found["seeds"]) == len(script["SEEDS"]) == 5
+
+
+def test_the_page_of_shapes_is_what_its_script_makes_of_the_data(tmp_path, monkeypatch):
+    """After a change: python scripts/shapes_page.py --page."""
+    script = runpy.run_path(str(ROOT / "scripts" / "shapes_page.py"))
+    page = tmp_path / "shapes.md"
+    page.write_text(script["PAGE"].read_text(encoding="utf-8"), encoding="utf-8")
+    kept = json.loads(script["DATA"].read_text(encoding="utf-8"))
+    monkeypatch.setitem(script["write_page"].__globals__, "PAGE", page)
+    script["write_page"](kept)
+    assert page.read_text(encoding="utf-8") == script["PAGE"].read_text(encoding="utf-8")
+    for kind in script["ROBOTS"]:
+        for gait in script["TASKS"]:
+            assert sum(script["shares"](kept, kind, gait)) / len(kept) >= 0.9

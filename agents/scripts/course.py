@@ -18,6 +18,7 @@ from tca_mj.agents.scripts.tetrapod import CRAWL, SHIMMY, WALK
 from tca_mj.checks import Checked, Edge, NotNegative, door
 from tca_mj.control import Gait, Thermostat
 from tca_mj.envs.course import OBSERVATION, Places, TetrapodCourse
+from tca_mj.envs.gaits import TASKS
 from tca_mj.robots.tetrapod import SPINES
 
 Array = NDArray[np.float64]
@@ -148,7 +149,7 @@ class CourseWalker:
     soft = 116.0  # spines are hot enough to be bent [°C]
     rigid = 75.0  # spines are cold enough to be let go [°C]
     warm = 80.0  # spines are warmed to this ahead of a change of shape, and still rigid [°C]
-    walkable = np.radians(88.0)  # least bend at which it stands on its feet [rad]
+    walkable = TASKS["walk"].bend  # less bent its belly lies on the beam's end [rad]
     easing = 0.3  # by which the TCAs cool while spines that cool fast become stiff [K/s]
     clinging = 0.05  # the same of rigid ones that still pull [K/s]
     hottest = 172.0  # temperature that no TCA is to exceed [°C]
