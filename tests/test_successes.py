@@ -119,6 +119,8 @@ def written(folder):
 def test_a_run_that_is_broken_off_ends_as_one_that_is_not(tmp_path, monkeypatch):
     config = tiny()
     saved = train(config, tmp_path / "whole", progress=False, video=False)
+    rows = (tmp_path / "whole" / "evaluations.csv").read_text().splitlines()
+    assert [row.split(",")[0] for row in rows] == ["steps", "8.0", "20.0"]  # imitation, the end
     assert saved.arguments == {"action": "temperature", "control_period": 0.2, "offsets": True}
     env = make(ARM, **saved.arguments)
     policy = load_policy(tmp_path / "whole" / "best.npz", env)

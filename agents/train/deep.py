@@ -224,6 +224,7 @@ class Run:
             show(self.model, tasks, first, config.seed)
             if isinstance(self.model, ImitatingSAC):
                 self.model.warm_up(_WARM_UP)
+                self.evaluate()  # what imitation alone has given
             return
         gait = first_gaits(config.task, config.start)
         demonstrate(self.model, tasks, gait, first, config.seed, self.env.pairs)

@@ -59,8 +59,8 @@ class Shelf:
 class SuccessReplayBuffer(ReplayBuffer):
     """A replay buffer whose batches are, in their first half, from episodes that were shown.
 
-    Those are a script's that succeeded. What the learner does is in the other half, with success or
-    without: from its lucky episodes alone it would learn that haste is safe.
+    Those are a script's that succeeded. What the learner does is in the other half only, with
+    success or without: its lucky episodes alone would say that haste is safe.
 
     An episode is remembered when it is over. A memory tells what its action and the next
     ``n_steps`` - 1 have earned, and what was seen then.
