@@ -13,6 +13,7 @@ from __future__ import annotations
 import argparse
 import json
 import time
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -76,12 +77,17 @@ def measured(task: str, policy: str, kind: tuple[str, str], out: Path, **more: A
     return [found["speed"]["mean"], found["peak_temperature"]["most"], found["success"]["mean"]]
 
 
-def speeds(task: str, policy: str, out: Path, **more: Any) -> dict[str, list[float]]:
-    """Those figures on every kind of robot."""
-    return {" ".join(kind): measured(task, policy, kind, out, **more) for kind in ROBOTS}
+def speeds(
+    task: str, policy: str, out: Path, body: str, **more: Any
+) -> dict[str, list[float]]:  # fmt: skip
+    """Those figures on every kind of robot with a body."""
+    return {" ".join(kind): measured(task, policy, kind, out, **more) for kind in ROBOTS
+            if kind[0] == body}  # fmt: skip
 
 
-def specialist_speeds(gait: str, seed: int, policy: str, out: Path) -> dict[str, list[float]]:
+def specialist_speeds(
+    gait: str, seed: int, policy: str, out: Path, body: str
+) -> dict[str, list[float]]:  # fmt: skip
     """The same of a specialist. One that ships was measured on rigid bodies for the page of the
     gaits, which is checked by the nominal robot.
 
@@ -89,25 +95,21 @@ def specialist_speeds(gait: str, seed: int, policy: str, out: Path) -> dict[str,
         ValueError: If it was not as fast there.
     """
     task = task_of(gait)
-    if policy not in shipped():
-        return speeds(task, policy, out)
+    if policy not in shipped() or body != "rigid":
+        return speeds(task, policy, out, body)
     known = json.loads(GAITS.read_text(encoding="utf-8"))[task]["seeds"][str(seed)]
     found = {}
-    for kind in ROBOTS:
-        if kind[0] != "rigid":
-            found[" ".join(kind)] = measured(task, policy, kind, out)
-            continue
-        figures = known["nominal" if kind[1] == "nominal" else "robots"]
-        found[" ".join(kind)] = [figures["speed"]["mean"], figures["peak_temperature"]["most"],
-                                 figures["success"]["mean"]]  # fmt: skip
+    for name, key in (("rigid nominal", "nominal"), ("rigid 16 robots", "robots")):
+        figures = [known[key][figure] for figure in ("speed", "peak_temperature", "success")]
+        found[name] = [figures[0]["mean"], figures[1]["most"], figures[2]["mean"]]
     now, before = measured(task, policy, ("rigid", "nominal"), out)[0], found["rigid nominal"][0]
     if abs(now - before) > 1e-3 * before:
         raise ValueError(f"{policy} must be as fast as {GAITS.name} says, {before}, got {now}")
     return found
 
 
-def one_of_all(seed: int, out: Path) -> dict[str, Any]:
-    """A policy of all shapes, its specialists, and how fast all of them are."""
+def one_of_all(seed: int, out: Path) -> Iterator[dict[str, Any]]:
+    """A policy of all shapes, its specialists, and how fast all of them are, body by body."""
     chosen = SETS[seed]
     known = {gait: specialist(gait, number, out) for gait, number in chosen.items()}
     teachers = tuple(
@@ -123,28 +125,31 @@ def one_of_all(seed: int, out: Path) -> dict[str, Any]:
     spent = folder / "processor_time.json"
     if new:  # else it went on, or was done
         write_whole(spent, json.dumps(round(time.process_time() - before)).encode())
-    rows = {}
-    for gait, policy in known.items():
-        rows[gait] = {
-            "seed": chosen[gait],
-            "specialist": specialist_speeds(
-                gait, chosen[gait], policy, out / "measured" / f"{gait}_{chosen[gait]}"
-            ),
-            "one": speeds(TASK, str(folder), folder / "measured" / gait, options={"gait": gait}),
-        }
     used = json.loads(spent.read_text(encoding="utf-8")) if spent.is_file() else None
-    return {"processor_time": used, "shapes": rows}
+    rows: dict[str, Any] = {
+        gait: {"seed": number, "specialist": {}, "one": {}} for gait, number in chosen.items()
+    }
+    for body in dict.fromkeys(body for body, _ in ROBOTS):
+        for gait, policy in known.items():
+            apart, number = out / "measured" / f"{gait}_{chosen[gait]}", chosen[gait]
+            rows[gait]["specialist"] |= specialist_speeds(gait, number, policy, apart, body)
+            rows[gait]["one"] |= speeds(
+                TASK, str(folder), folder / "measured" / gait, body, options={"gait": gait}
+            )
+        yield {"processor_time": used, "shapes": rows}
 
 
 def shares(kept: dict[str, Any], kind: tuple[str, str], gait: str) -> list[float]:
     """Speed of the one policy over that of the specialist, seed by seed."""
-    key, each = " ".join(kind), [found["shapes"][gait] for found in kept.values()]
+    key = " ".join(kind)
+    each = [found["shapes"][gait] for found in kept.values() if key in found["shapes"][gait]["one"]]
     return [float(found["one"][key][0] / found["specialist"][key][0]) for found in each]
 
 
 def share_table(kept: dict[str, Any], kind: tuple[str, str]) -> list[str]:
     """Speeds on one kind of robot: specialist, one policy and its share, seed by seed."""
     key, rows = " ".join(kind), []
+    kept = {seed: each for seed, each in kept.items() if key in each["shapes"]["walk"]["one"]}
     for gait in TASKS:
         cells, found = [gait], shares(kept, kind, gait)
         for each, share in zip(kept.values(), found, strict=True):
@@ -161,7 +166,7 @@ def in_short(kept: dict[str, Any]) -> str:
                            for gait, kind in everywhere)  # fmt: skip
     single, seed, where, which = min(
         (share, seed, gait, " ".join(kind)) for gait, kind in everywhere
-        for seed, share in zip(kept, shares(kept, kind, gait), strict=True)
+        for seed, share in zip(kept, shares(kept, kind, gait), strict=False)
     )  # fmt: skip
     rows = [row for each in kept.values() for found in each["shapes"].values()
             for who in ("specialist", "one") for row in found[who].values()]  # fmt: skip
@@ -191,9 +196,11 @@ def main(argv: list[str] | None = None) -> None:
     arguments = parser.parse_args(argv)
     kept = json.loads(DATA.read_text(encoding="utf-8")) if DATA.is_file() else {}
     for seed in [] if arguments.page else arguments.seeds:
-        kept[str(seed)] = one_of_all(seed, arguments.out)
-        kept = dict(sorted(kept.items()))
-        write_whole(DATA, (json.dumps(kept, indent=1) + "\n").encode())
+        for found in one_of_all(seed, arguments.out):
+            kept[str(seed)] = found
+            kept = dict(sorted(kept.items()))
+            write_whole(DATA, (json.dumps(kept, indent=1) + "\n").encode())
+            write_page(kept)
     write_page(kept)
 
 

@@ -421,4 +421,5 @@ def test_the_page_has_the_figures_that_were_kept(tmp_path, monkeypatch):
     assert page.read_text(encoding="utf-8") == script["PAGE"].read_text(encoding="utf-8")
     rows = kept["specialists"]
     assert len(rows) == 10 and sum(not row["ending"] for row in rows) == 9
+    assert not any(row["ending"] for row in kept["shapes"])
     assert not any(row["harmed"] for each in kept.values() for row in each)
