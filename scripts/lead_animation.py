@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from tca_mj.agents.policies import load_policy
+from tca_mj.record.film import clock
 from tca_mj.record.render import Offscreen
 from tca_mj.registry import make
 
@@ -49,7 +50,7 @@ def frames(task: str, policy: str, distance: float, up: float) -> list[NDArray[n
             camera.lookat[:] = [x, y, start[1] + up]
             own.paint()
             name = task.partition("Tetrapod")[2].partition("-")[0].lower()
-            shown.append(screen.draw(own.data, f"{name}{speed}"))
+            shown.append(screen.draw(own.data, f"{name}{speed}\n{clock(info['time'], SPEED)}"))
     return shown
 
 

@@ -16,6 +16,8 @@ from PIL import Image
 
 from tca_mj.agents.policies import actor, arguments_of
 from tca_mj.agents.rollout import rollout
+from tca_mj.record.film import clock
+from tca_mj.record.render import Offscreen
 from tca_mj.registry import TASKS, make, task_class
 
 SIZE = (384, 288)  # of a picture [pixels]
@@ -39,8 +41,7 @@ def film(id: str) -> tuple[list[Image.Image], float]:
     """
     name = ACTORS.get(id, "scripted")
     arguments: dict[str, Any] = arguments_of(name, id)
-    env = make(id, render_mode="rgb_array", size=SIZE,
-               disable_env_checker=True, **arguments)  # fmt: skip
+    env = make(id, disable_env_checker=True, **arguments)
     task: Any = env.unwrapped
     most = np.inf if id == COURSE else round(LONGEST / task.control_period)
     count = 3 * COUNT if id == COURSE else COUNT
@@ -51,14 +52,19 @@ def film(id: str) -> tuple[list[Image.Image], float]:
         if steps > most and task_class(id).legs:
             break
     wanted = set(np.linspace(0, steps - 1, count).round().astype(int))
+    fast = float(f"{(steps - 1) * task.control_period / (len(wanted) * SHOWN):.2g}")
     pictures = []
-    for i, _ in enumerate(rollout(env, policy, seed=0)):
-        if i in wanted:
-            pictures.append(Image.fromarray(np.asarray(env.render())))
-        if i >= steps - 1:
-            break
+    with Offscreen(task.model, width=SIZE[0], height=SIZE[1], camera=task.camera,
+                   coils=task.sim.tendon) as screen:  # fmt: skip
+        for i, _ in enumerate(rollout(env, policy, seed=0)):
+            if i in wanted:
+                task.paint()
+                shown = clock((i + 1) * task.control_period, fast)
+                pictures.append(Image.fromarray(screen.draw(task.data, shown)))
+            if i >= steps - 1:
+                break
     env.close()
-    return pictures, (steps - 1) * task.control_period / (len(pictures) * SHOWN)
+    return pictures, fast
 
 
 def main() -> None:

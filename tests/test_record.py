@@ -577,6 +577,15 @@ print(left.draw(data).shape)
     assert (done.returncode, done.stdout, done.stderr) == (0, "(48, 64, 3)\n", "")
 
 
+@pytest.mark.parametrize(
+    ("time", "speed", "said"),
+    [(12.34, 1.0, "12.3 s"), (12.34, 23.0, "12.3 s, 23 times as fast"),
+     (0.0512, 0.1, "0.05 s, 10 times as slow")],
+)  # fmt: skip
+def test_a_clock_tells_time_and_pace(time: float, speed: float, said: str) -> None:
+    assert film_module.clock(time, speed) == said
+
+
 def test_wrong_films_are_refused(tmp_path: Path, simulation: Chain) -> None:
     pytest.importorskip("imageio_ffmpeg")
     with pytest.raises(ValueError, match="mp4"):

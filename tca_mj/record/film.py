@@ -23,6 +23,14 @@ _Fps = Annotated[float, partial(number, at_least=1.0, at_most=240.0)]
 FilmSpeed = Annotated[float, partial(number, at_least=1e-3, at_most=3600.0)]
 
 
+def clock(time: float, speed: float) -> str:
+    """What a film's clock says: the time of the simulation [s], and how fast it goes by [1]."""
+    said = f"{time:.{1 + max(0, math.ceil(-math.log10(speed)))}f} s"
+    if speed == 1.0:
+        return said
+    return f"{said}, {max(speed, 1.0 / speed):.3g} times as {'fast' if speed > 1.0 else 'slow'}"
+
+
 class Film(Closing):
     """A simulation filmed at a steady rate, whatever its control period; a context manager.
 
@@ -62,10 +70,7 @@ class Film(Closing):
         self._writer: Any = None
         self._claim: Claim | None = None
         self._fps, self._rate = fps, fps / speed
-        self._pace, self._digits = "", 1 + max(0, math.ceil(-math.log10(speed)))
-        if speed != 1.0:
-            times, how = max(speed, 1.0 / speed), "fast" if speed > 1.0 else "slow"
-            self._pace = f", {times:.3g} times as {how}"
+        self._speed = speed
         self._size = width, height
         self._camera = camera
         self._view: Offscreen | None = None
@@ -99,7 +104,7 @@ class Film(Closing):
                 coils=self.simulation.tendon,
             )  # fmt: skip
         colour_tendons(model, self.simulation.tendon, self.simulation.temperature)
-        picture = self._view.draw(self.simulation.data, f"{time:.{self._digits}f} s{self._pace}")
+        picture = self._view.draw(self.simulation.data, clock(time, self._speed))
         if self._writer is None:
             self._claim = Claim(self.path)
             self._writer = self._imageio.get_writer(
