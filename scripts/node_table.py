@@ -35,6 +35,7 @@ MODULES: dict[str, tuple[Build, str, float, list[list[float]]]] = {
         [[25], [100], [120], [140], [160]],
     ),
 }  # fmt: skip
+DEFAULT = BendingSpec().nodes  # that of all three, in bold
 # Largest velocity of a joint at which a part rests for sure, and with which MuJoCo's solver may let
 # it creep (docs/soft-bodies.md, The integrator) [m/s, rad/s].
 AT_REST, CREEP = 1e-6, 1e-2
@@ -91,7 +92,8 @@ def main(argv: list[str] | None = None) -> None:
                     continue
                 at, turned = tip(sim, site)
                 error = 100.0 * float(np.linalg.norm(at - place)) / length
-                cells.append(f"{error:.2f} %, {angle(turn, turned):.1f}°")
+                bold = "**" if nodes == DEFAULT else ""
+                cells.append(f"{bold}{error:.2f} %, {angle(turn, turned):.1f}°{bold}")
             print(f"| {name} | {', '.join(map(str, case))} | {' | '.join(cells)} |", flush=True)
 
 

@@ -18,6 +18,8 @@ def test_what_differs_is_written_and_what_is_nowhere_is_not():
     assert text == TWICE.replace("| 4 |", "| 5 |")
     assert known == changed == ["| a | b |"]
     assert SCRIPT["replaced"](text, printed) == (text, known, [])
+    zero = SCRIPT["tables"]("| a | b |\n|---|---|\n| -0.0 | -0.01 |\n")
+    assert zero["| a | b |"] == ["| a | b |\n|---|---|\n| 0.0 | -0.01 |\n"]
 
 
 def test_every_source_is_a_script_and_its_pages_exist():
