@@ -67,8 +67,8 @@ NO_DOOR = {
             "sim.Simulation.take", "sim.Simulation.snaps",
             "tca.dynamics.stepping.LoadedTcas.heated",
             "tca.dynamics.stepping.LoadedTcas.pull", "tca.supply.Supply.power",
-            "tca.dynamics.stepping.LoadedTcas.check_domain", "tca.bank.TcaBank.pulls",
-            "tca.laws.creep.CreepBank.law",
+            "tca.dynamics.stepping.LoadedTcas.check_domain", "tca.laws.creep.CreepBank.law",
+            "tca.laws.rod.CoilRods.crept",
             "tca.supply.Supply.like", "actuation",
             *(f"agents.model.dynamics.{name}" for name in (
                 "View.lift", "View.scaled", "View.remember", "View.read", "View.states",
@@ -443,6 +443,8 @@ class Case:
         words |= {"fuzzed"} if _OF_A_FILE.search(said) else set()  # the file's name
         kinds = [hostile_of(kind) for kind in self.hostile.values()]
         derived = any(isinstance(kind, int | float) for kind in kinds)  # what follows from it
+        said_of = [each for kind in kinds for each in (kind if isinstance(kind, list) else [kind])]
+        words |= {str(key) for each in said_of if isinstance(each, Mapping) for key in each}
         if not (derived or any(word in said for word in words)):
             return f"ValueError names none of {names}: {said}"[:300]
         return ""

@@ -154,10 +154,14 @@ def opened(path: str | Path, kind: str, newest: int) -> tuple[dict[str, Any], di
     said = str(found.pop("header"))
     if len(said) > LONGEST:
         raise ValueError(f"header must have at most {LONGEST} characters, got {len(said)}")
-    header = json.loads(said)
+    header = json.loads(said, parse_constant=_refused)
     if (header.pop("kind"), header.pop("format")) != (kind, newest):
         raise ValueError(f"kind must be {kind!r} in format {newest}")
     return header, found
+
+
+def _refused(constant: str) -> None:
+    raise ValueError(f"numbers of the header must be finite, got {constant}")
 
 
 def rows_of(made_for: Mapping[str, Any], table: str) -> dict[str, tuple[int, float, float]]:

@@ -180,7 +180,12 @@ class BistableSpec(Checked):
         return in_silicone(self.tca, section=section, perimeter=perimeter, touching=0.5)
 
     def route(self, side: float) -> UTurn:
-        """The legs of the TCA on a side of ``SIDES``."""
+        """The legs of the TCA on a side of ``SIDES``.
+
+        Raises:
+            ValueError: If the side is no number.
+        """
+        number("side", side)
         return UTurn.parallel(self.offset, self.half_width, 0.0 if side > 0.0 else math.pi)
 
 

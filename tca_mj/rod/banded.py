@@ -88,7 +88,7 @@ class BandedRod(Checked):
         within("force", self.force, shape=(2,), unit="N")
 
     @door
-    def lumped(self, bend: float) -> float:
+    def lumped(self, bend: Angle) -> float:
         """Energy of a rod that stays an arc (Sun, eq. 4.5; a slack band has none) [J].
 
         Args:
@@ -99,25 +99,25 @@ class BandedRod(Checked):
         return 0.5 * self.stiffness * (bend - self.angle) ** 2 + 0.5 * self.band * more**2
 
     @door
-    def energy(self, bend: float) -> float:
+    def energy(self, bend: Angle) -> float:
         """Energy U of the rod at an angle θ of its tip [rad], all else free [J]."""
         return self._least(bend)[0]
 
     @door
-    def tip(self, bend: float) -> tuple[float, float]:
+    def tip(self, bend: Angle) -> tuple[float, float]:
         """Where the tip is then, towards the positive bend and along the base [m]."""
         turn = self._least(bend)[2] @ _shapes()[2]
         weight = self.length * _shapes()[0]
         return float(weight @ np.sin(turn)), float(weight @ np.cos(turn))
 
     @door
-    def curvature(self, bend: float) -> tuple[float, ...]:
+    def curvature(self, bend: Angle) -> tuple[float, ...]:
         """Coefficients c of the curvature there [rad]."""
         return tuple(self._least(bend)[2].tolist())
 
     @door
     def moment(
-        self, bend: float, *, lumped: bool = False, friction: NotNegative = 0.0
+        self, bend: Angle, *, lumped: bool = False, friction: NotNegative = 0.0
     ) -> float:
         """Moment that keeps the rod at an angle of its tip: U'(θ), if there is no friction [N m].
 
@@ -147,7 +147,7 @@ class BandedRod(Checked):
         def largest(sign: float) -> float:
             """Largest moment on the way to the top, from the other side."""
 
-            def needed(bend: float) -> float:
+            def needed(bend: Angle) -> float:
                 return sign * self.moment(-sign * bend, lumped=lumped, friction=friction)
 
             grid = np.linspace(0.0, _TURN, 31)
@@ -174,7 +174,7 @@ class BandedRod(Checked):
         ]
         return tuple(float(angle) for angle in found)
 
-    def _least(self, bend: float, friction: float = 0.0) -> tuple[float, float, Array]:
+    def _least(self, bend: Angle, friction: float = 0.0) -> tuple[float, float, Array]:
         """Energy at rest at an angle, the cable's moment there, and the coefficients."""
         weight, each, whole = _shapes()
         own = self.stiffness / (2.0 * np.arange(_TERMS) + 1.0)

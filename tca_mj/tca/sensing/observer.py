@@ -200,15 +200,15 @@ class TcaObserver:
         ohms = self._sized("resistance", within("resistance", resistance, above=0.0))
         if steady_power is None:
             warm = self.bank.heat.ambient if temperature is None else temperature
-            warm = np.broadcast_to(within("temperature", warm), ohms.shape)
+            warm = _fitted("temperature", within("temperature", warm), ohms.shape)
             return self._begun(ohms, warm, warm, None)
         if temperature is not None:
             raise ValueError(
                 "temperature must be None where steady_power tells it, got"
                 f" {temperature} °C and {steady_power} W"
             )
+        steady_power = _fitted("steady_power", floats("steady_power", steady_power), ohms.shape)
         warm = self.bank.heat.ambient + self._rise(steady_power)
-        warm = np.broadcast_to(warm, ohms.shape)
         return self._begun(ohms, warm, self.bank.heat.steady_body(warm), steady_power)
 
     @door
@@ -250,7 +250,7 @@ class TcaObserver:
             ValueError: If a number is not finite or out of range.
         """
         power = within("power", power, at_least=0.0, unit="W")
-        spec = self.spec
+        power, spec = _fitted("power", power, estimate.mean.shape[1:]), self.spec
         mean, jacobian, heated, give = self._moved(estimate.mean, power, dt)
         covariance = np.einsum("ij...,jk...,lk...->il...", jacobian, estimate.covariance, jacobian)
         covariance += spec.temperature_rate**2 * dt * heated[:, None] * heated
@@ -412,6 +412,7 @@ class TcaObserver:
             ValueError: If the last axis is not n, or a number not finite.
         """
         self._sized("temperature", temperature)
+        load = _fitted("load", load, temperature.shape)
         length = np.broadcast_to(self.bank.rest_length, temperature.shape)
         for _ in range(_NEWTON):
             force, slope = self._pull(length, temperature)
@@ -527,3 +528,11 @@ class TcaObserver:
         if values.shape[-1:] != (self.bank.n,):
             raise ValueError(f"{name} must have shape (..., {self.bank.n}), got {values.shape}")
         return values
+
+
+def _fitted(name: str, values: Array, shape: tuple[int, ...]) -> Array:
+    """Values as an array of a shape."""
+    try:
+        return np.broadcast_to(values, shape)
+    except ValueError as error:
+        raise ValueError(f"{name} must fit the shape {shape}, got {np.shape(values)}") from error
