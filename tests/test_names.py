@@ -61,8 +61,8 @@ INTERNAL = {
         "morphing": "add_end dress",
     },
     "tca_mj.record": {
-        "coils": "*", "layout": "*", "plots": "event_rows save_figure", "render": "Closing",
-        "shapes": "*",
+        "coils": "*", "film": "clock", "layout": "*", "plots": "event_rows save_figure",
+        "render": "Closing", "shapes": "*",
     },
     "tca_mj.certify": {"": "*"},
     "tca_mj.validation": {"": "*"},

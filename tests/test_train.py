@@ -21,7 +21,7 @@ from tca_mj.agents.policies import SavedPolicy, load_policy
 from tca_mj.agents.policies.files import ResidualPolicy
 from tca_mj.agents.scripts.tetrapod import GAITS, STEERING, gait_policy
 from tca_mj.agents.train import config as settings
-from tca_mj.agents.train import deep
+from tca_mj.agents.train import deep, gait_score
 from tca_mj.agents.train.config import OffPolicy, OnPolicy, TrainConfig, default_config
 from tca_mj.agents.train.deep import Run, exported, learner, train
 from tca_mj.agents.train.learning_env import LearningEnv
@@ -235,6 +235,7 @@ def test_a_correction_of_a_gait_goes_on_too(tmp_path, monkeypatch):
     assert env.action_space.contains(policy.act(env.reset(seed=0)[0]))
     with pytest.raises(ValueError, match=r"holds a run with residual 10\.0, not 20\.0"):
         train(replace(config, residual=20.0), tmp_path / "parts", progress=False)
+    monkeypatch.setattr("tca_mj.agents.train.search.walking", gait_score.walking.__wrapped__)
     with pytest.raises(ValueError, match=r"algorithm \w+, not cma; take another folder"):
         search(SearchConfig(task=WALK), tmp_path / "parts", progress=False)
 
