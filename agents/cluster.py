@@ -12,7 +12,7 @@ import tempfile
 import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -106,6 +106,12 @@ class ClusterWorkers:
                 ray.cancel(reference, force=True)
 
 
+@cache
+def _token() -> str:
+    """What opens the clusters of this process; Ray remembers the first that it is told."""
+    return secrets.token_hex(32)
+
+
 def _start(told: Mapping[str, Any]) -> None:
     """Starts or joins it, and leaves SIGTERM to whom it belonged before."""
     import ray
@@ -138,7 +144,7 @@ def _own(out: Path, workers: int) -> Iterator[dict[str, Any]]:
     before = ray_constants.ENABLE_RAY_CLUSTER  # it may have been imported without ``_OWN``
     ray_constants.ENABLE_RAY_CLUSTER = False
     try:
-        with _environment({"RAY_AUTH_TOKEN": secrets.token_hex(32)}), _temporary(out) as folder:
+        with _environment({"RAY_AUTH_TOKEN": _token()}), _temporary(out) as folder:
             yield {"address": "local", "num_cpus": workers, "include_dashboard": False,
                    "_temp_dir": str(folder)}  # fmt: skip
     finally:

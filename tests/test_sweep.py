@@ -4,6 +4,7 @@ import csv
 import json
 import os
 import signal
+import subprocess
 import sys
 import threading
 from contextlib import suppress
@@ -276,6 +277,23 @@ def test_a_trial_whose_process_is_lost_goes_on(tmp_path, monkeypatch):
     assert not (tmp_path / "home").exists()
     with clusters._temporary(tmp_path / "out") as own:
         assert [own] == list(own.parent.glob(f"{own.name[:-8]}*"))
+
+
+def test_a_second_cluster_starts_in_the_same_process(tmp_path):
+    """Ray remembers the token of the first one."""
+    pytest.importorskip("ray")
+    script = f"""
+from pathlib import Path
+import ray
+from tca_mj.agents.cluster import cluster
+for name in "ab":
+    with cluster(Path({str(tmp_path)!r}, name), 1, None):
+        print(ray.get(ray.remote(lambda: name.upper()).remote()))
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, timeout=300, check=False
+    )
+    assert (done.returncode, done.stdout.split()) == (0, ["A", "B"]), done.stderr
 
 
 def test_what_a_killed_sweep_left_of_ray_is_removed(tmp_path, monkeypatch):
