@@ -147,7 +147,7 @@ class BandedRod(Checked):
         def largest(sign: float) -> float:
             """Largest moment on the way to the top, from the other side."""
 
-            def needed(bend: Angle) -> float:
+            def needed(bend: float) -> float:
                 return sign * self.moment(-sign * bend, lumped=lumped, friction=friction)
 
             grid = np.linspace(0.0, _TURN, 31)
@@ -174,7 +174,7 @@ class BandedRod(Checked):
         ]
         return tuple(float(angle) for angle in found)
 
-    def _least(self, bend: Angle, friction: float = 0.0) -> tuple[float, float, Array]:
+    def _least(self, bend: float, friction: float = 0.0) -> tuple[float, float, Array]:
         """Energy at rest at an angle, the cable's moment there, and the coefficients."""
         weight, each, whole = _shapes()
         own = self.stiffness / (2.0 * np.arange(_TERMS) + 1.0)
