@@ -3,11 +3,13 @@
     python scripts/shimmy_limit.py                       the first three of the 16 robots
     python scripts/shimmy_limit.py --seeds 1014 --generations 30
     python scripts/shimmy_limit.py --replay              held for longer, in other cycles
+    python scripts/shimmy_limit.py --free 12 14          any temperatures, in cycles of so many
 
 Prints tables of docs/gaits.md. Gaits ask for temperatures every 0.2 s, for those in the middle of
 each time. On single robots CMA-ES begins with the gait that ships and looks for speed alone,
-whatever it costs, over whole cycles; then both gaits walk that robot for 60 s from cold. Physics
-runs at 10 ms.
+whatever it costs, over whole cycles; then both gaits walk that robot for 60 s from cold. Free of
+any form, each pair of TCAs has a temperature for each 0.4 s of a cycle; the search begins with
+those of the shipped gait or policy, on the robot that is off by nothing. Physics runs at 10 ms.
 """
 
 from __future__ import annotations
@@ -23,6 +25,8 @@ from cmaes import CMA
 from numpy.typing import NDArray
 
 from tca_mj.agents.policies.actors import first_gait
+from tca_mj.agents.policies.files import SavedPolicy
+from tca_mj.agents.policies.load import find
 from tca_mj.agents.train.gait_space import GaitSpace
 from tca_mj.agents.train.sb3_env import TaskVecEnv
 from tca_mj.control import Gait
@@ -39,6 +43,8 @@ ROBOTS = tuple(range(1000, 1016))  # those of docs/gaits.md
 HOLDS = (0.2, 0.4, 0.5)  # [s]
 PERIODS = (5.0, 5.3, 5.9, 6.4, 7.2)  # [s]
 SIGMA, POPULATION = 0.04, 15  # of the search; the cube of all gaits has edges of 1
+STEP = 0.4  # for which a temperature is held where a cycle may have any [s]
+FREE_SIGMA, FREE_POPULATION = 0.08, 19  # of that search; an action is from -1 to 1
 
 
 def tasks(count: int, held: float = PERIOD) -> Any:
@@ -103,6 +109,65 @@ def sought(start: Gait, seed: int, generations: int) -> Gait:
     return best[1]
 
 
+def both_sides(program: Array) -> Array:
+    """Actions of twelve TCAs, shape (..., 12), of those of the six that are on the left."""
+    legs = program.reshape(*program.shape[:-1], 2, 1, 3)
+    return np.broadcast_to(legs, (*legs.shape[:-3], 2, 2, 3)).reshape(*program.shape[:-1], 12)
+
+
+def program_of(name: str, cycle: int) -> Array:
+    """What a policy asks of the left TCAs in a cycle of so many decisions, shape (cycle, 6)."""
+    saved, env = SavedPolicy.read(find(name)), tasks(1, STEP).envs[0]
+    if saved.gait is not None:
+        phases = (np.arange(cycle) + 0.5) / cycle
+        asked = np.stack([env.asking(together(saved.gait).temperature(phase)) for phase in phases])
+    else:
+        assert saved.network is not None
+        observation, _ = env.reset(seed=0)
+        rows = []
+        for _ in range(8 * cycle):
+            rows.append(saved.network(observation))
+            observation = env.step(rows[-1])[0]
+        asked = np.mean(np.reshape(rows[4 * cycle :], (4, cycle, 12)), axis=0)
+    return np.clip(asked.reshape(cycle, 2, 2, 3)[:, :, 0], -1.0, 1.0).reshape(cycle, 6)
+
+
+def marched(vector: Any, programs: Sequence[Array], duration: float) -> Array:
+    """Way of each program on the robot that is off by nothing, (decisions + 1, programs) [m]."""
+    for i in range(len(programs)):
+        vector.restart(i, seed=0)
+    ways = [np.zeros(len(programs))]
+    for step in range(round(duration / STEP)):
+        asked = np.stack([both_sides(each[step % len(each)]) for each in programs])
+        outcomes = vector.advance(np.clip(asked, -1.0, 1.0).astype(np.float32))
+        ways.append(np.array([outcome[4]["distance"] for outcome in outcomes]))
+    return np.array(ways)
+
+
+def freed(name: str, cycle: int, generations: int) -> list[str]:
+    """A row of the table of programs of any form: how fast the first one is, and the best."""
+    first, begun = program_of(name, cycle), time.process_time()
+    optimiser = CMA(mean=first.ravel(), sigma=FREE_SIGMA, seed=0,
+                    population_size=FREE_POPULATION)  # fmt: skip
+    warm = round(WARM / STEP / cycle) * cycle
+    last = warm + max(1, round(JUDGED / STEP / cycle)) * cycle
+    vector, best = tasks(FREE_POPULATION + 1, STEP), (-np.inf, first)
+    for generation in range(generations):
+        points = [optimiser.ask() for _ in range(FREE_POPULATION)]
+        programs = [point.reshape(cycle, 6) for point in [*points, np.array(optimiser.mean)]]
+        ways = marched(vector, programs, STEP * last)
+        found = (ways[last] - ways[warm]) / (STEP * (last - warm))
+        optimiser.tell([(p, -1e3 * v) for p, v in zip(points, found[:-1], strict=True)])
+        if found[-1] > best[0]:
+            best = found[-1], programs[-1]
+        if generation % 10 == 0:
+            print(f"{name}, {cycle}: {generation}, {1e3 * found[-1]:.2f} mm/s", flush=True)
+    vector.close()
+    speeds = marched(tasks(2, STEP), [first, best[1]], WHOLE)[-1] / WHOLE
+    return [name, f"{STEP * cycle:.1f} s", f"{1e3 * speeds[0]:.2f}", f"{1e3 * speeds[1]:.2f}",
+            f"{1e3 * best[0]:.2f}", f"{(time.process_time() - begun) / 60.0:.0f}"]  # fmt: skip
+
+
 def replayed(start: Gait) -> list[str]:
     """The gait on the 16 robots: held for some times, and with other periods."""
     rows, best = [], np.zeros(len(ROBOTS))
@@ -131,7 +196,16 @@ def main(argv: list[str] | None = None) -> None:
     parser.add_argument("--seeds", type=int, nargs="+", default=[1000, 1001, 1002])
     parser.add_argument("--generations", type=int, default=15)
     parser.add_argument("--replay", action="store_true", help="nothing is sought")
+    parser.add_argument("--free", type=int, nargs="+", metavar="DECISIONS", help="of a cycle")
+    parser.add_argument("--begin", default=START, help="policy that a free search begins with")
     arguments = parser.parse_args(argv)
+    if arguments.free:
+        print("\n".join(table(
+            ["begun with", "cycle", "as it begins, 60 s [mm/s]", "best, 60 s", "best, whole cycles",
+             "processor time [min]"],
+            [freed(arguments.begin, cycle, arguments.generations) for cycle in arguments.free],
+        )))  # fmt: skip
+        return
     start, rows = together(first_gait(TASK, START)[0]), []
     if arguments.replay:
         print("\n".join(replayed(start)))

@@ -54,6 +54,16 @@ if __name__ == "__main__":
            validation_episodes=1, validate_every=2), Path("out"), workers=2)
 """
 
+DISTIL = f"""
+import sys
+from pathlib import Path
+from tca_mj.agents.train import Teacher, distil_config
+from tca_mj.agents.train.distil import distil
+teachers = tuple(Teacher(policy=name) for name in ("tetrapod-walk-sac", "tetrapod-command"))
+distil(distil_config({WALK!r}, teachers, steps=750, envs=1, gradient_steps=50, batch_size=32,
+                     hidden=(8,)), Path("out"))
+"""
+
 
 def figures(folder: Path) -> Any:
     """What an evaluation has found."""
@@ -127,6 +137,7 @@ COMMANDS = {
                      "--workers", "2"), episodes, figures),
     "train": Command(("-c", TRAIN), learned, trained),
     "train cma": Command(("search.py",), learned, trained),
+    "distil": Command(("-c", DISTIL), learned, trained),
     "demo": Command((*CLI, "demo", "--policy", "random", *OUT, "--no-video"), told, played),
     "sweep": Command((*CLI, "sweep", "random", *OUT, "--episodes", "4", "--set", "seed=0,10",
                       "--set", "steps=150"), episodes,
