@@ -143,7 +143,7 @@ class ArmPickPlace(SimulatedTask):
     recipes = {
         "sac": Recipe.held(
             30_000, 0.2, discount=0.85, interval=2000, start="scripted", successes=True,
-            limit=12.0, episodes=60, arguments={"offsets": True},
+            limit=12.0, episodes=24, arguments={"offsets": True},
             practised={"object": "screwdriver"},
             learner={
                 "learning_rate": 5e-4, "batch_size": 256, "tau": 0.01, "ent_coef": "auto_0.05",
