@@ -142,14 +142,14 @@ class ArmPickPlace(SimulatedTask):
     script_holds = True
     recipes = {
         "sac": Recipe.held(
-            50_000, 0.2, discount=0.93, interval=2000, start="scripted", successes=True,
+            30_000, 0.2, discount=0.85, interval=2000, start="scripted", successes=True,
             limit=12.0, episodes=24, arguments={"offsets": True},
             practised={"object": "screwdriver"},
             learner={
                 "learning_rate": 5e-4, "batch_size": 256, "tau": 0.01, "ent_coef": "auto_0.05",
                 "learning_starts": 6000, "gradient_steps": 16, "hidden": (128, 128),
-                "buffer_size": 150_000, "n_steps": 3, "imitation": 8.0, "target_entropy": -12.0,
-                "last_rate": 0.3,
+                "buffer_size": 150_000, "n_steps": 3, "imitation": 10.0, "target_entropy": -12.0,
+                "last_rate": 0.1, "last_imitation": 0.3, "critics": 4,
             },
         )
     }

@@ -44,14 +44,50 @@ def test_half_of_a_batch_is_what_the_script_did_with_success():
     buffer.begin(showing=True)
     lived(buffer)
     buffer.begin()
-    assert (buffer.size(), buffer.shown.size) == (10, 5)
-    lived(buffer)  # what a learner does is not shown, with success or without
-    assert (buffer.size(), buffer.shown.size) == (20, 5)
+    assert (buffer.size(), buffer.shown) == (10, 5)
+    lived(buffer)  # what a learner does is not shown: it is not quicker
+    assert (buffer.size(), buffer.shown) == (20, 5)
     np.random.seed(0)
     batch = buffer.sample(64)
     which = batch.observations[:, 1].numpy()
     assert (which[:32] == 1.0).all() and 0.2 < which[32:].mean() < 0.8
     assert set(batch.actions[:32, 0].tolist()) == {10.0, 11.0, 12.0, 13.0, 14.0}
+
+
+def test_quicker_episodes_take_the_place_of_the_scripts_where_nearly_all_succeed():
+    buffer = memory(n_envs=1, kind="object")
+
+    def lived(success, kind, length, mark):
+        for k in range(length):
+            seen = np.full((1, 2), mark, np.float32)
+            info = {"success": success and k == length - 1, "object": kind}
+            buffer.add(seen, seen, seen[:, :1], np.zeros(1), np.array([k == length - 1]), [info])
+
+    def marks(kind):
+        shelf = buffer.examples[kind].shelf
+        return sorted(shelf.rows[: shelf.size, 0].tolist())
+
+    buffer.begin(showing=True)
+    for kind in ("board", "tool"):
+        for _ in range(2):
+            lived(True, kind, 6, 0.0)
+        lived(False, kind, 6, 0.0)
+    buffer.begin()
+    for n in range(19):
+        lived(True, "board", 3, 0.5)
+        lived(n % 4 > 0, "tool", 3, 0.5)
+    assert marks("board") == marks("tool") == [0.0] * 12  # too few to know
+    lived(True, "board", 7, 0.6)
+    assert marks("board") == [0.0] * 12  # slower
+    lived(True, "board", 5, 0.7)
+    lived(True, "tool", 5, 0.7)
+    assert marks("board") == [0.0] * 7 + [buffer.to_torch(np.float32(0.7)).item()] * 5
+    assert marks("tool") == [0.0] * 12  # a quarter failed: luck
+    assert buffer.examples["board"].lengths == [6, 5]
+    for _ in range(20):
+        lived(False, "board", 3, 0.8)
+    lived(True, "board", 3, 0.9)
+    assert 0.9 not in np.round(marks("board"), 3)  # not safe any more
 
 
 def test_if_nothing_has_succeeded_a_batch_is_of_all_memories():
@@ -150,12 +186,14 @@ def test_the_script_makes_the_first_steps_and_is_imitated(tmp_path):
     config = tiny(learner=replace(tiny().learner, learning_starts=60, batch_size=128))
     with closing(Run(config, RunFolder(tmp_path, config, ""))) as run:
         assert not any(isinstance(m, torch.nn.LayerNorm) for m in run.model.actor.modules())
-        assert sum(isinstance(m, torch.nn.LayerNorm) for m in run.model.critic.modules()) == 2
+        assert sum(isinstance(m, torch.nn.LayerNorm) for m in run.model.critic.modules()) == 4
         run.demonstrate()
         model = run.model
         memory = model.replay_buffer
-        assert memory.shown.size and not memory.showing
-        batch = memory.parts(memory.shown.rows[: memory.shown.size])
+        assert set(memory.examples) == {"pcb", "screwdriver"} and not memory.showing
+        rows = [each.shelf.rows[: each.shelf.size] for each in memory.examples.values()]
+        batch = memory.parts(np.concatenate(rows))
+        assert len(batch.actions) == memory.shown > 0
         assert (batch.dones == 0.0).all()  # the script is under way when time is up
 
         def off():
@@ -179,7 +217,7 @@ def test_the_script_makes_the_first_steps_and_is_imitated(tmp_path):
     [
         ({"scaled": False}, "successes must be False but for SAC"),
         ({"algorithm": "td3"}, "successes must be False but for SAC"),
-        ({"successes": False}, "learner.imitation must be 0 without successes, got 8"),
+        ({"successes": False}, "learner.imitation must be 0 without successes, got 10"),
         ({"start": "random"}, "successes must be False where no script is shown"),
         ({"start": "trot"}, "start must be 'random' but for a task with legs"),
         ({"limit": 0.0}, "limit must be finite and above 0"),
@@ -196,12 +234,21 @@ def test_impossible_settings_are_refused(change, message):
     [
         ({"n_steps": 0}, "n_steps must be"),
         ({"imitation": -1.0}, "imitation must be"),
+        ({"last_imitation": 1.5}, "last_imitation must be"),
+        ({"critics": 1}, "critics must be"),
         ({"target_entropy": "auto_1"}, "target_entropy must be"),
     ],
 )
 def test_impossible_learners_are_refused(change, message):
     with pytest.raises(ValueError, match=message):
         OffPolicy(**change)
+
+
+def test_more_than_two_critics_are_of_learners_that_are_shown_something():
+    with pytest.raises(ValueError, match="learner.critics must be 2 without successes, got 4"):
+        TrainConfig(
+            task="TCA/TetrapodWalk-v0", algorithm="sac", learner=OffPolicy(critics=4), scaled=True
+        )
 
 
 def test_several_steps_are_told_by_unmirrored_memories_only():

@@ -99,6 +99,8 @@ class OffPolicy(Checked):
         n_steps: Steps whose rewards a memory adds up, up to 10 000; 1 with mirrored memories.
         imitation: Weight of what was shown where half of each batch is from there, 0 to 1000, see
             ``tca_mj.agents.train.successes`` [1].
+        last_imitation: Share of it that is left at the end, to which it falls by and by [1].
+        critics: How many there are, 2 to 100; more than 2 only where something is shown.
         use_sde: Whether noise depends on what is seen (gSDE); not of TD3.
         noise: Standard deviation of TD3's actions, above 0 up to 1 [1]; the others find their own.
         hidden: Widths of the up to 16 hidden layers of actor and critics, with ReLU; up to 10 000.
@@ -120,6 +122,8 @@ class OffPolicy(Checked):
     target_entropy: Annotated[float | str, _target] = "auto"
     n_steps: Few = 1
     imitation: Annotated[float, partial(number, at_least=0.0, at_most=1000.0)] = 0.0
+    last_imitation: Share = 0.02
+    critics: Annotated[int, partial(whole, at_least=2, at_most=100)] = 2
     use_sde: bool = False
     noise: Part = 0.1
     hidden: Widths = (64, 64)
@@ -227,6 +231,9 @@ class TrainConfig(Checked):
             imitation, n_steps = self.learner.imitation, self.learner.n_steps  # type: ignore[union-attr]
             if imitation and not self.successes:
                 raise ValueError(f"learner.imitation must be 0 without successes, got {imitation}")
+            critics = self.learner.critics  # type: ignore[union-attr]
+            if critics != 2 and not self.successes:
+                raise ValueError(f"learner.critics must be 2 without successes, got {critics}")
             if n_steps > 1 and (self.mirrored or self.algorithm == "crossq"):
                 raise ValueError(
                     f"learner.n_steps must be 1 for CrossQ and mirrored memories, got {n_steps}"

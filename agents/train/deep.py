@@ -383,9 +383,11 @@ def learner(config: TrainConfig, env: VecEnv) -> BaseAlgorithm:
             env.unwrapped, retold=config.retold, alike=config.alike, seed=config.seed
         )
     if config.successes:
+        network["n_critics"] = settings["critics"]
         settings["replay_buffer_class"] = SuccessReplayBuffer
         settings["replay_buffer_kwargs"] = {
             "n_steps": settings.pop("n_steps"), "gamma": settings["gamma"],
+            "kind": next(iter(config.practised), ""),
         }  # fmt: skip
     known = inspect.signature(kind).parameters
     model: BaseAlgorithm = kind(
@@ -394,6 +396,7 @@ def learner(config: TrainConfig, env: VecEnv) -> BaseAlgorithm:
     )  # fmt: skip
     if isinstance(model, ImitatingSAC):
         model.imitation = settings["imitation"]
+        model.last_imitation = settings["last_imitation"]
     return model
 
 

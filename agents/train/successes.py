@@ -8,7 +8,7 @@ are.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
@@ -17,11 +17,13 @@ import torch
 from numpy.typing import NDArray
 from stable_baselines3 import SAC
 from stable_baselines3.common.buffers import ReplayBuffer
+from stable_baselines3.common.policies import ContinuousCritic
 from stable_baselines3.common.torch_layers import create_mlp
 from stable_baselines3.common.type_aliases import ReplayBufferSamples
+from stable_baselines3.common.utils import polyak_update
 
-_LAST_IMITATION = 0.02  # share of its weight that is left at the end, an estimate
-_AVERAGING = 1e-4  # share by which the mean follows the actor, with each update; an estimate
+_LATELY, _SAFE = 20, 0.85  # episodes, and the share of them that is safe; estimates
+_AVERAGING = 2e-4  # share by which the mean follows the actor, with each update; an estimate
 _FIRST_SPREAD = -3.0  # logarithm of the standard deviation of the first actions, an estimate
 
 
@@ -43,6 +45,11 @@ class Shelf:
         self._next = (self._next + 1) % len(self.rows)
         self.size = min(self.size + 1, len(self.rows))
 
+    def close(self) -> None:
+        """Leaves no room but for the rows that are there."""
+        if self.size < len(self.rows):
+            self.rows, self._next = self.rows[: self.size].copy(), 0
+
     def drawn(self, count: int) -> NDArray[np.float32]:
         """Rows by chance, shape (count, width); there has to be one."""
         return self.rows[np.random.randint(self.size, size=count)]
@@ -56,25 +63,64 @@ class Shelf:
         self.rows[: self.size] = rows
 
 
+class Examples:
+    """What is imitated of one kind of episode: a script's successes, then better ones.
+
+    Attributes:
+        shelf: Their memories.
+        lengths: Steps that each of these episodes took.
+        lately: Whether each of the learner's last episodes of this kind succeeded.
+    """
+
+    def __init__(self, room: int, width: int) -> None:
+        self.shelf = Shelf(room, width)
+        self.lengths: list[int] = []
+        self.lately: list[bool] = []
+
+    def show(self, rows: list[NDArray[np.float32]]) -> None:
+        """Keeps an episode of the script."""
+        self.lengths.append(len(rows))
+        for row in rows:
+            self.shelf.add(row)
+
+    def offer(self, rows: list[NDArray[np.float32]], success: bool) -> bool:
+        """Judges an episode of the learner, and keeps it in the oldest one's place if it is better.
+
+        It is if it succeeded in less time than half of the examples, and nearly all that was done
+        lately succeeded: a lucky episode alone would say that haste is safe.
+        """
+        self.lately = [*self.lately, success][-_LATELY:]
+        safe = len(self.lately) == _LATELY and np.mean(self.lately) >= _SAFE
+        better = bool(success and safe and self.lengths and len(rows) < np.median(self.lengths))
+        if better:
+            self.shelf.close()
+            self.lengths = [*self.lengths[1:], len(rows)]
+            for row in rows:
+                self.shelf.add(row)
+        return better
+
+
 class SuccessReplayBuffer(ReplayBuffer):
     """A replay buffer whose batches are, in their first half, from episodes that were shown.
 
-    Those are a script's that succeeded. What the learner does is in the other half only, with
-    success or without: its lucky episodes alone would say that haste is safe.
+    Those are a script's that succeeded, and in their place, by and by, the learner's that were
+    better, see ``Examples``. All else that the learner does is in the other half only.
 
     An episode is remembered when it is over. A memory tells what its action and the next
     ``n_steps`` - 1 have earned, and what was seen then.
 
     Attributes:
         showing: Whether what is added is the script's.
+        kind: What in a task's info tells kinds of episodes apart; "" for nothing.
         lived: All memories. A row is an observation, an action, the observation after ``n_steps``,
             whether the episode has ended by then, what was earned and the discount of what comes.
-        shown: Those of the script's episodes with success.
+        examples: What is imitated, by kind.
     """
 
     def __init__(
         self, buffer_size: int, observation_space: Any, action_space: Any, device: Any = "auto",
-        n_envs: int = 1, *, n_steps: int = 1, gamma: float = 0.99, **kwargs: Any,
+        n_envs: int = 1, *, n_steps: int = 1, gamma: float = 0.99, kind: str = "",
+        **kwargs: Any,
     ) -> None:  # fmt: skip
         """Takes the arguments of ``ReplayBuffer``, and those of its ``NStepReplayBuffer``.
 
@@ -86,6 +132,7 @@ class SuccessReplayBuffer(ReplayBuffer):
             n_envs: Environments that are stepped together.
             n_steps: Steps whose rewards a memory adds up.
             gamma: Discount per step [1].
+            kind: What in a task's info tells kinds of episodes apart; "" for nothing.
             **kwargs: As for ``ReplayBuffer``.
         """
         super().__init__(1, observation_space, action_space, device, 1, **kwargs)
@@ -93,8 +140,10 @@ class SuccessReplayBuffer(ReplayBuffer):
         seen, done = int(np.prod(self.obs_shape)), self.action_dim
         self._edges = np.cumsum([seen, done, seen, 1, 1])
         width = int(self._edges[-1]) + 1
-        self.lived, self.shown = Shelf(buffer_size, width), Shelf(buffer_size, width)
-        self.showing = False
+        self.lived = Shelf(buffer_size, width)
+        self._room, self._width = buffer_size, width
+        self.showing, self.kind = False, kind
+        self.examples: dict[str, Examples] = {}
         self._paths: list[list[tuple[Any, ...]]] = [[] for _ in range(n_envs)]
 
     def begin(self, *, showing: bool = False) -> None:
@@ -107,11 +156,20 @@ class SuccessReplayBuffer(ReplayBuffer):
             ended = bool(done[i]) and not info.get("TimeLimit.truncated", False)
             path.append((obs[i].copy(), action[i].copy(), next_obs[i].copy(), ended, reward[i]))
             if done[i]:
-                for row in self._told(path):
-                    self.lived.add(row)
-                    if self.showing and info.get("success", False):
-                        self.shown.add(row)
+                self._remember(self._told(path), info)
                 self._paths[i] = []
+
+    def _remember(self, rows: list[NDArray[np.float32]], info: dict[str, Any]) -> None:
+        """Keeps an episode, also as an example if it is one."""
+        for row in rows:
+            self.lived.add(row)
+        success, kind = bool(info.get("success", False)), str(info.get(self.kind, ""))
+        if kind not in self.examples:
+            self.examples[kind] = Examples(self._room, self._width)
+        if not self.showing:
+            self.examples[kind].offer(rows, success)
+        elif success:
+            self.examples[kind].show(rows)
 
     def _told(self, path: list[tuple[Any, ...]]) -> list[NDArray[np.float32]]:
         """The memories of an episode."""
@@ -130,9 +188,22 @@ class SuccessReplayBuffer(ReplayBuffer):
 
     def sample(self, batch_size: int, env: Any = None) -> ReplayBufferSamples:
         """A batch; if nothing was shown it is of all memories."""
-        half = batch_size // 2 if self.shown.size else 0
-        drawn = [self.shown.drawn(half)] if half else []
-        return self.parts(np.concatenate([*drawn, self.lived.drawn(batch_size - half)]))
+        half = batch_size // 2 if self.shown else 0
+        return self.parts(np.concatenate([self.drawn(half), self.lived.drawn(batch_size - half)]))
+
+    @property
+    def shown(self) -> int:
+        """How many memories are examples."""
+        return sum(each.shelf.size for each in self.examples.values())
+
+    def drawn(self, count: int) -> NDArray[np.float32]:
+        """Memories of examples by chance, shape (count, width)."""
+        shelves = [each.shelf for each in self.examples.values() if each.shelf.size]
+        if not (count and shelves):
+            return np.zeros((0, self._width), np.float32)
+        shares = np.array([shelf.size for shelf in shelves]) / self.shown
+        counts = np.random.multinomial(count, shares).tolist()
+        return np.concatenate([s.drawn(n) for s, n in zip(shelves, counts, strict=True)])
 
     def parts(self, rows: NDArray[np.float32]) -> ReplayBufferSamples:
         """Rows of memories as a batch."""
@@ -140,21 +211,36 @@ class SuccessReplayBuffer(ReplayBuffer):
         return ReplayBufferSamples(*(self.to_torch(np.ascontiguousarray(part)) for part in parts))
 
 
+def worth_of(
+    critic: ContinuousCritic, seen: torch.Tensor, actions: torch.Tensor,
+    which: Iterable[int] | None = None,
+) -> torch.Tensor:  # fmt: skip
+    """What critics, or some of them, say that actions are worth, shape (n, critics)."""
+    given = torch.cat([seen, actions], dim=1)
+    chosen = range(critic.n_critics) if which is None else which
+    return torch.cat([critic.q_networks[i](given) for i in chosen], dim=1)
+
+
 class ImitatingSAC(SAC):
     """SAC that does, too, what it was shown: less and less.
 
-    The layers of its critics are normalised, which lets them learn more often from a memory, and
-    its first actions vary little. It remembers in a ``SuccessReplayBuffer``. What it is good for is
-    the mean of what its actor was lately, which fails far less often than the actor of any moment.
+    The layers of its critics are normalised, which lets them learn more often from a memory. What
+    comes is worth what the lesser says of two of them by chance (Chen et al., Randomized ensembled
+    double Q-learning, 2021); in what to do the least of all counts. Its first actions vary little.
+    It remembers in a ``SuccessReplayBuffer``. What it is good for is the mean of what its actor was
+    lately, which fails far less often than the actor of any moment.
 
     Attributes:
         averaged: That mean, the actor's tensors by name; empty before anything is learned.
         imitation: Weight of the squared distance from actions that were shown, in units of the
             reward, at the beginning [1].
+        last_imitation: Share of it that is left at the end [1].
     """
 
     imitation: float = 0.0
+    last_imitation: float = 0.02
     averaged: dict[str, torch.Tensor]
+    replay_buffer: SuccessReplayBuffer
 
     def _setup_model(self) -> None:
         super()._setup_model()
@@ -169,7 +255,9 @@ class ImitatingSAC(SAC):
                 critic.q_networks[i] = torch.nn.Sequential(*layers).to(self.device)
                 setattr(critic, f"qf{i}", critic.q_networks[i])
         self.critic_target.load_state_dict(self.critic.state_dict())
-        self.critic.optimizer = torch.optim.Adam(self.critic.parameters(), self.lr_schedule(1))
+        for each in (self.actor, self.critic):
+            rate = self.lr_schedule(1)
+            each.optimizer = torch.optim.Adam(each.parameters(), rate, fused=True)
         spread: Any = self.actor.log_std
         with torch.no_grad():
             spread.weight.mul_(0.01)
@@ -177,24 +265,81 @@ class ImitatingSAC(SAC):
 
     def warm_up(self, steps: int) -> None:
         """Learns from what is remembered to act likewise, and then what that is worth."""
-        batch_size: int = self.batch_size
         for _ in range(steps):
-            self._imitate(batch_size // 2)
-        learned = {name: row.clone() for name, row in self.actor.state_dict().items()}
+            self._act_better(self.replay_buffer.sample(self.batch_size), judged=False)
         for _ in range(steps):
-            super().train(1, batch_size)
-            self.actor.load_state_dict(learned)
+            self._judge_better(self.replay_buffer.sample(self.batch_size))
 
     def train(self, gradient_steps: int, batch_size: int = 64) -> None:
-        """Learns from batches of memories, and imitates as many."""
+        """Learns from batches of memories, and imitates their first halves."""
+        self.policy.set_training_mode(True)
+        self._update_learning_rate([self.actor.optimizer, self.critic.optimizer])
         for _ in range(gradient_steps):
-            super().train(1, batch_size)
-            self._imitate(batch_size // 2)
+            batch = self.replay_buffer.sample(batch_size)
+            self._judge_better(batch)
+            self._act_better(batch)
             now = self.actor.state_dict()
             if not self.averaged:
                 self.averaged = {name: row.clone() for name, row in now.items()}
             for name, row in self.averaged.items():
                 row.lerp_(now[name], _AVERAGING)
+
+    def _weight(self) -> torch.Tensor:
+        """Weight of the entropy."""
+        if self.ent_coef_optimizer is None:
+            return self.ent_coef_tensor
+        assert self.log_ent_coef is not None
+        return self.log_ent_coef.detach().exp()
+
+    def _judge_better(self, batch: ReplayBufferSamples) -> None:
+        """A gradient step of the critics."""
+        critic, target = self.critic, self.critic_target
+        assert batch.discounts is not None
+        with torch.no_grad():
+            after, likely = self.actor.action_log_prob(batch.next_observations)
+            pair = np.random.choice(critic.n_critics, 2, replace=False).tolist()
+            worth = worth_of(target, batch.next_observations, after, pair).amin(dim=1, keepdim=True)
+            worth -= self._weight() * likely.reshape(-1, 1)
+            aim = batch.rewards + (1.0 - batch.dones) * batch.discounts * worth
+        off = worth_of(critic, batch.observations, batch.actions) - aim
+        loss = 0.5 * (off**2).mean(dim=0).sum()
+        self.critic.optimizer.zero_grad()
+        loss.backward()
+        self.critic.optimizer.step()
+        polyak_update(critic.parameters(), target.parameters(), self.tau)
+        self.logger.record("train/critic_loss", float(loss.detach()) / critic.n_critics)
+
+    def _act_better(self, batch: ReplayBufferSamples, *, judged: bool = True) -> None:
+        """A gradient step of the actor, by the critics or by imitation alone, and of the noise."""
+        critic, actor = self.critic, self.actor
+        noise: Any = actor.action_dist
+        mean, spread, _ = actor.get_action_dist_params(batch.observations)
+        loss = torch.zeros(())
+        if judged:
+            actions, likely = noise.log_prob_from_params(mean, spread)
+            critic.requires_grad_(False)
+            worth = worth_of(critic, batch.observations, actions).amin(dim=1)
+            critic.requires_grad_(True)
+            loss = (self._weight() * likely - worth).mean()
+            self.logger.record("train/actor_loss", float(loss.detach()))
+        shown = len(mean) // 2 if self.replay_buffer.shown else 0
+        left = self._current_progress_remaining
+        weight = self.imitation * (self.last_imitation + (1.0 - self.last_imitation) * left)
+        if shown and weight:
+            apart = torch.tanh(mean[:shown]) - batch.actions[:shown]
+            apart = (apart**2).sum(dim=1).mean()
+            self.logger.record("train/apart", float(apart.detach()))
+            loss = loss + weight * apart
+        actor.optimizer.zero_grad()
+        loss.backward()
+        actor.optimizer.step()
+        if judged and self.ent_coef_optimizer is not None:
+            assert self.log_ent_coef is not None
+            missing = (likely.detach() + float(self.target_entropy)).mean()
+            self.ent_coef_optimizer.zero_grad()
+            (-self.log_ent_coef * missing).sum().backward()
+            self.ent_coef_optimizer.step()
+            self.logger.record("train/ent_coef", float(self._weight()))
 
     @contextmanager
     def at_its_mean(self) -> Iterator[None]:
@@ -208,15 +353,3 @@ class ImitatingSAC(SAC):
 
     def _excluded_save_params(self) -> list[str]:
         return [*super()._excluded_save_params(), "averaged"]
-
-    def _imitate(self, count: int) -> None:
-        memory: Any = self.replay_buffer
-        weight = self.imitation * max(self._current_progress_remaining, _LAST_IMITATION)
-        if not (weight and memory.shown.size):
-            return
-        batch = memory.parts(memory.shown.drawn(count))
-        own = self.actor(batch.observations, deterministic=True)
-        loss = weight * ((own - batch.actions) ** 2).sum(dim=1).mean()
-        self.actor.optimizer.zero_grad()
-        loss.backward()
-        self.actor.optimizer.step()
