@@ -1,7 +1,7 @@
 """Evaluates every agent in every task and writes docs/results.md, with its data and its pictures.
 
-Tables of docs/training.md, on the policies that come with the package, and of docs/tetrapod.md, on
-the scripts of the gaits, are written, too.
+Tables of docs/training.md, on the policies that come with the package, of docs/tetrapod.md, on the
+scripts of the gaits, and of docs/tetrapod-model.md, on finer models, are written, too.
 
     python scripts/results_page.py                            what is missing, then the page
     python scripts/results_page.py --tasks TCA/BendReach-v0   of one task; the page of all there is
@@ -36,6 +36,7 @@ PICTURES = ROOT / "docs" / "pictures"
 COURSE = "TCA/TetrapodCourse-v0"
 MARK = "scripts/results_page.py"
 TRAINING, TETRAPOD = ROOT / "docs" / "training.md", ROOT / "docs" / "tetrapod.md"
+MODEL = ROOT / "docs" / "tetrapod-model.md"
 GOALS = [task.id for task in TASKS if "Tetrapod" not in task.id]  # they are reached or not
 
 # The robot, and what it is called on the page. Chance and nobody act on the first alone.
@@ -276,6 +277,24 @@ def scripts_table(results: dict[str, dict[str, dict[str, Any]]]) -> list[str]:
     return markdown(heads, rows)
 
 
+def models_table(results: dict[str, dict[str, dict[str, Any]]]) -> list[str]:
+    """Speeds of the script's and the searched gaits on the model in use and on finer ones."""
+    rows = []
+    for task in TASKS:
+        gait = task.kwargs.get("gait")
+        for policy, who in ((("scripted", "scripted"), (f"tetrapod-{gait}", "searched"))
+                            if gait else ()):  # fmt: skip
+            used, ten, finer = (
+                1e3 * results[task.id][policy][model]["figures"]["speed"]["mean"]
+                for model in ("nominal", "ten nodes a leg", "finer")
+            )
+            rows.append([f"{gait}, {who}", f"{used:.2f}", *(
+                f"{speed:.2f} ({round(100.0 * speed / used) - 100:+d} %)" for speed in (ten, finer)
+            )])  # fmt: skip
+    heads = ["gait", "the model in use [mm/s]", "ten nodes a leg", "finer body, too"]
+    return markdown(heads, rows)
+
+
 def main(argv: list[str] | None = None) -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     known = [task.id for task in TASKS]
@@ -308,6 +327,7 @@ def main(argv: list[str] | None = None) -> None:
     PAGE.write_text(page(results), encoding="utf-8")
     write_between(TRAINING, f"{MARK}: shipped", shipped_table(results))
     write_between(TETRAPOD, f"{MARK}: scripts", scripts_table(results))
+    write_between(MODEL, f"{MARK}: models", models_table(results))
     print(f"{PAGE}\n{DATA}")
 
 

@@ -3,6 +3,7 @@
     python scripts/shimmy_limit.py                       the first three of the 16 robots
     python scripts/shimmy_limit.py --seeds 1014 --generations 30
     python scripts/shimmy_limit.py --replay              held for longer, in other cycles
+    python scripts/shimmy_limit.py --replay --gait FILE  another gait, in its own task, held so
     python scripts/shimmy_limit.py --free 12 14          any temperatures, in cycles of so many
 
 Prints tables of docs/gaits.md. Gaits ask for temperatures every 0.2 s, for those in the middle of
@@ -40,17 +41,17 @@ COARSE = 10e-3  # physics time step of the search [s]
 WARM, JUDGED = 6.0, 16.0  # time that is not judged, and that is, rounded to whole cycles [s]
 WHOLE = 60.0  # an episode [s]
 ROBOTS = tuple(range(1000, 1016))  # those of docs/gaits.md
-HOLDS = (0.2, 0.4, 0.5)  # [s]
+HOLDS = (0.2, 0.3, 0.4, 0.5)  # [s]
 PERIODS = (5.0, 5.3, 5.9, 6.4, 7.2)  # [s]
 SIGMA, POPULATION = 0.04, 15  # of the search; the cube of all gaits has edges of 1
 STEP = 0.4  # for which a temperature is held where a cycle may have any [s]
 FREE_SIGMA, FREE_POPULATION = 0.08, 19  # of that search; an action is from -1 to 1
 
 
-def tasks(count: int, held: float = PERIOD) -> Any:
+def tasks(count: int, held: float = PERIOD, task: str = TASK) -> Any:
     """So many tasks that are told temperatures, on one thread."""
     return TaskVecEnv.make(
-        TASK, count, control_period=held, timestep=COARSE, num_threads=1, max_episode_steps=None
+        task, count, control_period=held, timestep=COARSE, num_threads=1, max_episode_steps=None
     ).tasks
 
 
@@ -168,13 +169,15 @@ def freed(name: str, cycle: int, generations: int) -> list[str]:
             f"{1e3 * best[0]:.2f}", f"{(time.process_time() - begun) / 60.0:.0f}"]  # fmt: skip
 
 
-def replayed(start: Gait) -> list[str]:
-    """The gait on the 16 robots: held for some times, and with other periods."""
+def replayed(start: Gait, task: str = TASK) -> list[str]:
+    """The gait on the 16 robots: held for some times, and the shimmy with other periods."""
     rows, best = [], np.zeros(len(ROBOTS))
     for held in HOLDS:
-        speeds = _on_robots(start, held)
+        speeds = _on_robots(start, held, task)
         best = np.maximum(best, speeds) if held == PERIOD else best
         rows.append([f"{held:g} s", f"{start.period:.2f} s", f"{1e3 * speeds.mean():.2f}"])
+    if task != TASK:
+        return table(["held for", "cycle", "16 robots [mm/s]"], rows)
     for period in PERIODS:
         speeds = _on_robots(replace(start, period=period), PERIOD)
         rows.append([f"{PERIOD:g} s", f"{period:.2f} s", f"{1e3 * speeds.mean():.2f}"])
@@ -183,9 +186,9 @@ def replayed(start: Gait) -> list[str]:
     return table(["held for", "cycle", "16 robots [mm/s]"], rows)
 
 
-def _on_robots(gait: Gait, held: float) -> Array:
+def _on_robots(gait: Gait, held: float, task: str = TASK) -> Array:
     """Its speed on each of the 16 robots, 60 s from cold [m/s]."""
-    vector = tasks(len(ROBOTS), held)
+    vector = tasks(len(ROBOTS), held, task)
     speeds: Array = travelled(vector, [gait] * len(ROBOTS), ROBOTS, WHOLE)[-1] / WHOLE
     vector.close()
     return speeds
@@ -196,6 +199,7 @@ def main(argv: list[str] | None = None) -> None:
     parser.add_argument("--seeds", type=int, nargs="+", default=[1000, 1001, 1002])
     parser.add_argument("--generations", type=int, default=15)
     parser.add_argument("--replay", action="store_true", help="nothing is sought")
+    parser.add_argument("--gait", metavar="FILE", help="another gait, with --replay")
     parser.add_argument("--free", type=int, nargs="+", metavar="DECISIONS", help="of a cycle")
     parser.add_argument("--begin", default=START, help="policy that a free search begins with")
     arguments = parser.parse_args(argv)
@@ -205,6 +209,12 @@ def main(argv: list[str] | None = None) -> None:
              "processor time [min]"],
             [freed(arguments.begin, cycle, arguments.generations) for cycle in arguments.free],
         )))  # fmt: skip
+        return
+    if arguments.gait:
+        saved = SavedPolicy.read(find(arguments.gait))
+        if not arguments.replay or saved.gait is None:
+            parser.error(f"argument --gait: must be a gait, with --replay, got {arguments.gait}")
+        print("\n".join(replayed(saved.gait, saved.task)))
         return
     start, rows = together(first_gait(TASK, START)[0]), []
     if arguments.replay:

@@ -306,7 +306,10 @@ TEMPERATURES = ((25.0, 25.0, 25.0), (60.0, 90.0, 90.0), (160.0, 90.0, 90.0), (60
 def legs() -> list[str]:
     """Table of the foot's place: what the model is off, and of that, what the missing twist is."""
     spec = SPEC.leg
-    others = {f"{n} nodes": replace(spec, nodes=n) for n in (3, 4, 5, 10)}
+    others = {
+        f"{n} nodes{' (in use)' if n == spec.nodes else ''}": replace(spec, nodes=n)
+        for n in (3, 4, 5, 10)
+    }  # fmt: skip
     others |= {"5, no twist": replace(spec, nodes=5, motions=("bend_x", "bend_y"))}
     rng = np.random.default_rng(0)
     directions = np.vstack([np.eye(3), -np.eye(3), rng.standard_normal((4, 3))])
@@ -378,7 +381,7 @@ def gaits(seconds: float = 24.0) -> list[str]:
         cells = []
         for name, speed in zip(names, used, strict=True):
             along, _ = headway(name, seconds, **options)
-            cells.append(f"{1e3 * along:.2f} ({100.0 * (along / speed - 1.0):+.0f} %)")
+            cells.append(f"{1e3 * along:.2f} ({round(100.0 * (along / speed - 1.0)):+d} %)")
         lines.append(f"| {model} | {' | '.join(cells)} |")
     return lines
 

@@ -22,6 +22,13 @@ def test_what_differs_is_written_and_what_is_nowhere_is_not():
     assert zero["| a | b |"] == ["| a | b |\n|---|---|\n| 0.0 | -0.01 |\n"]
 
 
+def test_a_column_of_times_does_not_count_and_all_else_does():
+    steady = SCRIPT["steady"]
+    row = "| who | error | decision [ms] |\n|---|---|---|\n| PI | {} | {} |\n"
+    assert steady(row.format(0.5, 8.1)) == steady(row.format(0.5, 9.7))
+    assert steady(row.format(0.5, 8.1)) != steady(row.format(0.6, 8.1))
+
+
 def test_every_source_is_a_script_and_its_pages_exist():
     for name, command in SCRIPT["PRINTED"].items():
         assert (ROOT / "scripts" / command.split()[0]).is_file()

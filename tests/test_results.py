@@ -34,6 +34,8 @@ def test_the_page_is_what_its_script_makes_of_the_data():
     assert "\n".join(script["shipped_table"](RESULTS)) in training
     tetrapod = (ROOT / "docs" / "tetrapod.md").read_text(encoding="utf-8")
     assert "\n".join(script["scripts_table"](RESULTS)) in tetrapod
+    model = (ROOT / "docs" / "tetrapod-model.md").read_text(encoding="utf-8")
+    assert "\n".join(script["models_table"](RESULTS)) in model
     names = {name for shown in script["SHOWN"].values() for name in shown}
     assert names <= METRICS.keys()
 
