@@ -271,3 +271,16 @@ def test_every_third_environment_practises():
         assert [tasks.tasks.envs[i].object for i in (0, 3)] == ["pcb", "pcb"]
         tasks.step(still)
     tasks.close()
+
+
+def test_what_a_run_is_asked_for_is_not_practised_otherwise():
+    config = default_config(ARM, options={"object": "pcb"})
+    assert config.practised == {} and default_config(ARM).practised == {"object": "screwdriver"}
+    tasks = TaskVecEnv.make(ARM, 4, reset_options=dict(config.options))
+    tasks.practised = dict(config.practised)
+    tasks.seed(0)
+    tasks.reset()
+    assert [env.object for env in tasks.tasks.envs] == ["pcb"] * 4
+    tasks.close()
+    with pytest.raises(ValueError, match=r"options\['friction'\] must be a number or a text"):
+        default_config(ARM, options={"friction": None})

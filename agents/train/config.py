@@ -180,7 +180,7 @@ class TrainConfig(Checked):
     steps: Steps = _STEPS
     seed: LearnerSeed = 0
     envs: Envs = 8
-    options: Mapping[str, float] = field(default_factory=dict)
+    options: Mapping[str, float | str] = field(default_factory=dict)
     arguments: Mapping[str, Any] = field(default_factory=dict)
     design: Mapping[str, Any] = field(default_factory=dict)
     timestep: Positive | None = None
@@ -328,7 +328,7 @@ def default_config(task: str, algorithm: str | None = None, **change: Any) -> Tr
         "retold": recipe.mirrored and bool(growing),
         "growth": growing,
         "successes": recipe.successes,
-        "practised": recipe.practised,
+        "practised": {k: v for k, v in recipe.practised.items() if k not in options},
         "limit": recipe.limit,
     }
     own = {"interval": recipe.interval, "evaluation_episodes": recipe.episodes}

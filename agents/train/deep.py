@@ -209,7 +209,7 @@ class Run:
         config, done = self.config, self.model.num_timesteps
         if config.growth:
             shares = {name: min(1.0, done / steps) for name, steps in config.growth.items()}
-            grown = {name: config.options[name] * share for name, share in shares.items()}
+            grown = {name: float(config.options[name]) * share for name, share in shares.items()}
             self.env.venv.tasks.reset_options = {**config.options, **grown}
 
     def demonstrate(self) -> None:
