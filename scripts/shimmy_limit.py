@@ -43,6 +43,7 @@ WHOLE = 60.0  # an episode [s]
 ROBOTS = tuple(range(1000, 1016))  # those of docs/gaits.md
 HOLDS = (0.2, 0.3, 0.4, 0.5)  # [s]
 PERIODS = (5.0, 5.3, 5.9, 6.4, 7.2)  # [s]
+REPLAYED = ["held for", "cycle", "16 robots [mm/s]", "nominal, 60 s", "nominal, whole cycles"]
 SIGMA, POPULATION = 0.04, 15  # of the search; the cube of all gaits has edges of 1
 STEP = 0.4  # for which a temperature is held where a cycle may have any [s]
 FREE_SIGMA, FREE_POPULATION = 0.08, 19  # of that search; an action is from -1 to 1
@@ -55,10 +56,12 @@ def tasks(count: int, held: float = PERIOD, task: str = TASK) -> Any:
     ).tasks
 
 
-def travelled(vector: Any, gaits: Sequence[Gait], seeds: Sequence[int], duration: float) -> Array:
+def travelled(
+    vector: Any, gaits: Sequence[Gait], seeds: Sequence[int], duration: float, off: float = 0.2
+) -> Array:
     """Way of each gait on its robot, after every decision, shape (decisions + 1, gaits) [m]."""
     for i, seed in enumerate(seeds):
-        vector.restart(i, seed=seed, options={"randomise": 0.2})
+        vector.restart(i, seed=seed, options={"randomise": off})
     ways, held = [np.zeros(len(gaits))], vector.envs[0].control_period
     for step in range(round(duration / held)):
         middle = (step + 0.5) * held
@@ -70,9 +73,9 @@ def travelled(vector: Any, gaits: Sequence[Gait], seeds: Sequence[int], duration
     return np.array(ways)
 
 
-def over_cycles(ways: Array, gaits: Sequence[Gait]) -> Array:
+def over_cycles(ways: Array, gaits: Sequence[Gait], held: float = PERIOD) -> Array:
     """Speed of each gait over whole cycles, once it is warm [m/s]."""
-    clock, speeds = PERIOD * np.arange(len(ways)), []
+    clock, speeds = held * np.arange(len(ways)), []
     for way, gait in zip(ways.T, gaits, strict=True):
         first = round(WARM / gait.period) * gait.period
         last = first + max(1, round(JUDGED / gait.period)) * gait.period
@@ -118,7 +121,10 @@ def both_sides(program: Array) -> Array:
 
 def program_of(name: str, cycle: int) -> Array:
     """What a policy asks of the left TCAs in a cycle of so many decisions, shape (cycle, 6)."""
-    saved, env = SavedPolicy.read(find(name)), tasks(1, STEP).envs[0]
+    saved, vector = SavedPolicy.read(find(name)), tasks(1, STEP)
+    held, env = saved.arguments.get("control_period"), vector.envs[0]
+    if saved.task != TASK or (saved.gait is None and held != STEP):
+        raise ValueError(f"policy must be one of {TASK} that holds for {STEP} s, got {name}")
     if saved.gait is not None:
         phases = (np.arange(cycle) + 0.5) / cycle
         asked = np.stack([env.asking(together(saved.gait).temperature(phase)) for phase in phases])
@@ -130,6 +136,7 @@ def program_of(name: str, cycle: int) -> Array:
             rows.append(saved.network(observation))
             observation = env.step(rows[-1])[0]
         asked = np.mean(np.reshape(rows[4 * cycle :], (4, cycle, 12)), axis=0)
+    vector.close()
     return np.clip(asked.reshape(cycle, 2, 2, 3)[:, :, 0], -1.0, 1.0).reshape(cycle, 6)
 
 
@@ -164,7 +171,9 @@ def freed(name: str, cycle: int, generations: int) -> list[str]:
         if generation % 10 == 0:
             print(f"{name}, {cycle}: {generation}, {1e3 * found[-1]:.2f} mm/s", flush=True)
     vector.close()
-    speeds = marched(tasks(2, STEP), [first, best[1]], WHOLE)[-1] / WHOLE
+    vector = tasks(2, STEP)
+    speeds = marched(vector, [first, best[1]], WHOLE)[-1] / WHOLE
+    vector.close()
     return [name, f"{STEP * cycle:.1f} s", f"{1e3 * speeds[0]:.2f}", f"{1e3 * speeds[1]:.2f}",
             f"{1e3 * best[0]:.2f}", f"{(time.process_time() - begun) / 60.0:.0f}"]  # fmt: skip
 
@@ -175,15 +184,26 @@ def replayed(start: Gait, task: str = TASK) -> list[str]:
     for held in HOLDS:
         speeds = _on_robots(start, held, task)
         best = np.maximum(best, speeds) if held == PERIOD else best
-        rows.append([f"{held:g} s", f"{start.period:.2f} s", f"{1e3 * speeds.mean():.2f}"])
+        rows.append([f"{held:g} s", f"{start.period:.2f} s", f"{1e3 * speeds.mean():.2f}",
+                     *_nominal(start, held, task)])  # fmt: skip
     if task != TASK:
-        return table(["held for", "cycle", "16 robots [mm/s]"], rows)
+        return table(REPLAYED, rows)
     for period in PERIODS:
         speeds = _on_robots(replace(start, period=period), PERIOD)
-        rows.append([f"{PERIOD:g} s", f"{period:.2f} s", f"{1e3 * speeds.mean():.2f}"])
+        rows.append([f"{PERIOD:g} s", f"{period:.2f} s", f"{1e3 * speeds.mean():.2f}",
+                     *_nominal(replace(start, period=period), PERIOD, task)])  # fmt: skip
         best = np.maximum(best, speeds)
-    rows.append([f"{PERIOD:g} s", "the best of these for each robot", f"{1e3 * best.mean():.2f}"])
-    return table(["held for", "cycle", "16 robots [mm/s]"], rows)
+    rows.append([f"{PERIOD:g} s", "the best of these for each robot", f"{1e3 * best.mean():.2f}",
+                 "", ""])  # fmt: skip
+    return table(REPLAYED, rows)
+
+
+def _nominal(gait: Gait, held: float, task: str) -> list[str]:
+    """Its speed on the robot that is off by nothing, 60 s from cold and over whole cycles."""
+    vector = tasks(1, held, task)
+    ways = travelled(vector, [gait], [0], WHOLE, 0.0)
+    vector.close()
+    return [f"{1e3 * v:.2f}" for v in (ways[-1, 0] / WHOLE, over_cycles(ways, [gait], held)[0])]
 
 
 def _on_robots(gait: Gait, held: float, task: str = TASK) -> Array:

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 import torch
 from gymnasium import spaces
+from test_train import broken_off_after
 
 from tca_mj.agents.policies import SavedPolicy, load_policy
 from tca_mj.agents.train.config import OffPolicy, TrainConfig, default_config
 from tca_mj.agents.train.deep import Run, train
-from tca_mj.agents.train.learning_env import LearningEnv
 from tca_mj.agents.train.runs import RunFolder
 from tca_mj.agents.train.sb3_env import TaskVecEnv
 from tca_mj.agents.train.successes import SuccessReplayBuffer
@@ -162,17 +162,7 @@ def test_a_run_that_is_broken_off_ends_as_one_that_is_not(tmp_path, monkeypatch)
     policy = load_policy(tmp_path / "whole" / "best.npz", env)
     assert env.action_space.contains(policy.act(env.reset(seed=0)[0]))
     env.close()
-    step, left = LearningEnv.step_wait, 0
-
-    def breaking(self):
-        nonlocal left
-        left -= 1
-        if left < 0:
-            raise KeyboardInterrupt
-        return step(self)
-
-    monkeypatch.setattr(LearningEnv, "step_wait", breaking)
-    for left in (2, 7, 100):  # noqa: B007  # amid the script's steps, amid an interval
+    for _ in broken_off_after((2, 7, 100), monkeypatch):  # amid the script's steps, an interval
         with suppress(KeyboardInterrupt):
             train(config, tmp_path / "parts", progress=False, video=False)
         torch.manual_seed(99)  # a new process would be elsewhere
