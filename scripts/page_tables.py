@@ -1,13 +1,14 @@
 """Holds tables of the pages against the scripts that print them, or writes them anew.
 
-    python scripts/page_tables.py --check              all of them; an hour of one core
+    python scripts/page_tables.py --check              all of them; under an hour of two cores
     python scripts/page_tables.py reach grasp          writes what has changed into these pages
     python scripts/page_tables.py reach --out FOLDER   keeps what the scripts print, too
 
 A table that is printed stands on the page with the same first row; where several have that, they
 are told apart by their order. What is printed and stands nowhere is said, and ends it with code 1,
-as with --check does a table that differs in more than its columns of times, or its roundings, which
-hang on the machine. Pages that a script of their own writes between marks are left out.
+as with --check does a table that differs in more than its columns and rows of times, or its
+roundings, which hang on the machine. Pages that a script of their own writes between marks are
+left out.
 """
 
 import argparse
@@ -30,6 +31,7 @@ PRINTED = {
     "bistable-gripper": "bistable_gripper_page.py --tables",
     "certificate": "tetrapod_certificate.py rails bending legs gaits",
     "coil-bvp": "conical_tca.py --table",
+    "contacts": "tetrapod_contacts.py",
     "finger": "finger_page.py --tables",
     "grasp": "grasp_page.py --tables",
     "learned-model": "learned_model_page.py --tables",
@@ -44,10 +46,12 @@ PRINTED = {
 }
 ELSEWHERE = {
     "bistable": ("bistable", "jump"), "certificate": ("tetrapod-model",),
+    "contacts": ("tetrapod",),
     "nodes": ("soft-bodies",), "rods": ("tetrapod-model",), "walk-limit": ("tetrapod",),
     "warnings": ("tetrapod",),
 }  # fmt: skip
-TIMES = ("decision [ms]", "step [ms]")  # columns that hang on the machine
+TIMES = ("decision [ms]", "step [ms]")  # columns that hang on the machine, and rows:
+TIMED = ("env.step", "env.step over its physics")
 ROUNDED = re.compile(r"^\| \| of these warned")  # the first row of a table that does
 TABLE = re.compile(r"^\|.*\n\|[-:| ]+\|\n(?:\|.*\n)*", re.MULTILINE)
 
@@ -58,10 +62,10 @@ def first_row(table: str) -> str:
 
 
 def steady(table: str) -> list[list[str]]:
-    """Its rows without columns of times."""
+    """Its rows without columns and rows of times."""
     rows = [[cell.strip() for cell in line.split("|")[1:-1]] for line in table.splitlines()]
     kept = [i for i, head in enumerate(rows[0]) if head not in TIMES]
-    return [[row[i] for i in kept] for row in rows]
+    return [[row[i] for i in kept] for row in rows if row[0] not in TIMED]
 
 
 def tables(text: str) -> dict[str, list[str]]:

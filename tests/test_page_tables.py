@@ -27,6 +27,9 @@ def test_a_column_of_times_does_not_count_and_all_else_does():
     row = "| who | error | decision [ms] |\n|---|---|---|\n| PI | {} | {} |\n"
     assert steady(row.format(0.5, 8.1)) == steady(row.format(0.5, 9.7))
     assert steady(row.format(0.5, 8.1)) != steady(row.format(0.6, 8.1))
+    rows = "| | walk |\n|---|---|\n| slide | {} |\n| env.step | {} |\n"
+    assert steady(rows.format(0.03, 3.9)) == steady(rows.format(0.03, 4.6))
+    assert steady(rows.format(0.03, 3.9)) != steady(rows.format(0.04, 3.9))
 
 
 def test_every_source_is_a_script_and_its_pages_exist():
