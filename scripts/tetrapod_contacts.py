@@ -36,7 +36,7 @@ from tca_mj.robots.tetrapod import LEGS
 STEPS = 600  # control steps, 60 s
 STEP = mujoco.mj_step
 STEP_TIME = 6.25e-3  # the task's own [s]
-WHO = ("script", "learned")
+WHO = ("script", "searched")
 
 
 class Contacts:
@@ -125,8 +125,8 @@ def follow(run: Run) -> tuple[Run, float, float]:
     random = np.random.default_rng(0)
     policy = None
     if run.who != "random":
-        learned = run.who == "learned"
-        policy = load_policy(f"tetrapod-{run.gait}", env) if learned else gait_policy(run.gait)
+        searched = run.who == "searched"
+        policy = load_policy(f"tetrapod-{run.gait}", env) if searched else gait_policy(run.gait)
     deepest, down = 0.0, False
 
     def watch(model: Any, data: Any, steps: int = 1) -> None:
