@@ -27,7 +27,7 @@ PAGE = Path(__file__).resolve().parent.parent / "docs" / "bench.md"
 MARK = "scripts/load_bandwidth.py"
 WEIGHT, SHARE = weight(20), 0.25
 BANDWIDTHS = (0.03, 0.1, 0.3, 1.0, 3.0, 10.0)  # [Hz]
-DT, LATE, SECONDS, RUNS = 0.01, 6.0, 12.0, 40  # as 100 readings per second
+DT, LATE, SECONDS, RUNS = 0.01, 6.0, 12.0, 200  # as 100 readings per second
 
 
 def powers(swing: float) -> Array:
@@ -72,7 +72,7 @@ def followed(
     def read(warm: Array, load: Array) -> Array:
         return observer.expected(replace(blank, mean=state(warm, load)))
 
-    # Forty losses, one from each fortieth of their distribution: chance would add a tenth.
+    # Losses, one from each part of their distribution that is as likely: chance would add to it.
     ratio = 1.0 + loss_error * norm.ppf((random.permutation(RUNS)[:, None] + 0.5) / RUNS)
     course = powers(swing)
     first = float(course.mean() / heat.loss[0])
