@@ -58,7 +58,7 @@ def test_quicker_episodes_take_the_place_of_the_scripts_where_nearly_all_succeed
     buffer = memory(n_envs=2, kind="object")
 
     def lived(success, kind, length, mark):
-        """In the second environment; with noise, in the first, what is quickest is of no account."""
+        """In the second environment; in the first, with noise, what is quickest counts nothing."""
         for k in range(length):
             last = k == length - 1
             seen = np.array([[0.4] * 2, [mark] * 2], np.float32)
