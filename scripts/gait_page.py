@@ -4,6 +4,7 @@
     python scripts/gait_page.py --tasks TCA/TetrapodWalk-v0   of one task; the page of all there is
     python scripts/gait_page.py --page                        the page alone, of what is there
     python scripts/gait_page.py --commands                    how the shipped walker follows
+    python scripts/gait_page.py --others --tasks TASK         script, search and corrections anew
 
 Runs and evaluations are kept in runs/gaits; a second call goes on where the first one stopped.
 ``docs/gaits.json`` holds the figures of the page, which tests compare with.
@@ -40,6 +41,7 @@ SEEDS = tuple(range(5))  # chosen before anything was trained
 ROBOTS = {"episodes": 16, "seed": 1000, "randomise": 0.2}  # the same for everybody
 NOMINAL = {"episodes": 1, "seed": 0}
 COMMANDED = {"episodes": 2, "seed": 0}
+CORRECTED = {"TCA/TetrapodCrawl-v0": 40.0}  # by how much the searched gait is, too [K]
 SHOWN = ("speed", "energy_per_metre", "peak_temperature", "drift")
 LEVEL = 0.95
 
@@ -84,12 +86,13 @@ def measured(task: str, policy: str, out: Path) -> dict[str, Any]:
     return found
 
 
-def trained(task: str, seed: int, out: Path) -> dict[str, Any]:
-    """A run of the recipe, its figures and its curve."""
-    config, before = default_config(task, seed=seed), time.process_time()
+def trained(task: str, seed: int, out: Path, **change: Any) -> dict[str, Any]:
+    """A run of the recipe, or of what differs from it, its figures and its curve."""
+    config, before = default_config(task, seed=seed, **change), time.process_time()
     print(described(config), flush=True)
     folder = out / f"seed_{seed}"
-    train(config, folder, command=f"tca-mj train {task} --seed {seed}", video=False)
+    more = "".join(f" --{name} {value}" for name, value in change.items())
+    train(config, folder, command=f"tca-mj train {task}{more} --seed {seed}", video=False)
     spent, used = folder / "processor_time.json", time.process_time() - before
     if spent.is_file():  # the run went on, or was done
         used += json.loads(spent.read_text(encoding="utf-8"))
@@ -125,11 +128,26 @@ def followed() -> list[str]:
                   "most off its heading [°]"], rows)  # fmt: skip
 
 
+def searched(task: str) -> str:
+    """The searched gait of a task that comes with the package."""
+    name = f"tetrapod-{name_of(task).removeprefix('Tetrapod').lower()}"
+    assert name in shipped()
+    return name
+
+
 def others(task: str, out: Path) -> dict[str, Any]:
     """Figures of the script and of the searched gait that comes with the package."""
-    searched = f"tetrapod-{name_of(task).removeprefix('Tetrapod').lower()}"
-    assert searched in shipped()
-    return {name: measured(task, name, out / name) for name in ("scripted", searched)}
+    return {name: measured(task, name, out / name) for name in ("scripted", searched(task))}
+
+
+def corrected(task: str, out: Path) -> dict[str, Any]:
+    """The searched gait as it is corrected by SAC, by seed; nothing but of some tasks."""
+    if task not in CORRECTED:
+        return {}
+    change = {"residual": CORRECTED[task], "start": searched(task)}
+    runs = {str(seed): trained(task, seed, out / "corrected", **change) for seed in SEEDS}
+    recipe = described(default_config(task, seed=0, **change)).rpartition(", seed")[0]
+    return {"corrected": runs, "correction": recipe}
 
 
 def of_task(task: str, out: Path) -> dict[str, Any]:
@@ -138,6 +156,7 @@ def of_task(task: str, out: Path) -> dict[str, Any]:
         "recipe": described(default_config(task, seed=0)).rpartition(", seed")[0],
         "others": others(task, out),
         "seeds": {str(seed): trained(task, seed, out) for seed in SEEDS},
+        **corrected(task, out),
     }  # fmt: skip
 
 
@@ -150,10 +169,18 @@ def cell(values: Sequence[float | None], factor: float, digits: int) -> str:
 
 def rows_of(found: dict[str, Any]) -> list[list[str]]:
     """The lines of a task's table."""
+    lines = figures_of(found["others"])
+    for kind, name in (("seeds", "SAC"), ("corrected", "corrected by SAC")):
+        several = found.get(kind, {})
+        lines += figures_of({f"{name}, seed {seed}": each for seed, each in several.items()})
+        lines += mean_of(name, [*several.values()]) if len(several) > 1 else []
+    return lines
+
+
+def figures_of(several: dict[str, Any]) -> list[list[str]]:
+    """Lines of policies."""
     lines = []
-    for name, each in [*found["others"].items(), *(
-        (f"SAC, seed {seed}", each) for seed, each in found["seeds"].items()
-    )]:  # fmt: skip
+    for name, each in several.items():
         robots, nominal = each["robots"], each["nominal"]
         speed = robots["speed"]
         lines.append([
@@ -163,21 +190,23 @@ def rows_of(found: dict[str, Any]) -> list[list[str]]:
             f"{robots['peak_temperature']['most']:.0f}",
             f"{each['processor_time'] / 60.0:.1f}" if "processor_time" in each else "",
         ])  # fmt: skip
-    several = list(found["seeds"].values())
-    if len(several) > 1:
-        mean = [
-            interval([each[kind]["speed"]["mean"] for each in several])
-            for kind in ("robots", "nominal")
-        ]
-        energy = np.mean([each["robots"]["energy_per_metre"]["mean"] for each in several])
-        lines.append([
-            f"**SAC, mean of {len(several)} seeds**", f"**{cell(mean[0], 1e3, 2)}**",
-            f"{1e3 * min(each['robots']['speed']['least'] for each in several):.2f}",
-            f"**{cell(mean[1], 1e3, 2)}**", f"{1e-3 * energy:.2f}",
-            f"{max(each['robots']['peak_temperature']['most'] for each in several):.0f}",
-            f"{np.mean([each['processor_time'] for each in several]) / 60.0:.1f}",
-        ])  # fmt: skip
     return lines
+
+
+def mean_of(name: str, several: list[dict[str, Any]]) -> list[list[str]]:
+    """The line of the mean over seeds."""
+    mean = [
+        interval([each[kind]["speed"]["mean"] for each in several])
+        for kind in ("robots", "nominal")
+    ]
+    energy = np.mean([each["robots"]["energy_per_metre"]["mean"] for each in several])
+    return [[
+        f"**{name}, mean of {len(several)} seeds**", f"**{cell(mean[0], 1e3, 2)}**",
+        f"{1e3 * min(each['robots']['speed']['least'] for each in several):.2f}",
+        f"**{cell(mean[1], 1e3, 2)}**", f"{1e-3 * energy:.2f}",
+        f"{max(each['robots']['peak_temperature']['most'] for each in several):.0f}",
+        f"{np.mean([each['processor_time'] for each in several]) / 60.0:.1f}",
+    ]]  # fmt: skip
 
 
 def draw(task: str, found: dict[str, Any]) -> Path:
@@ -217,7 +246,9 @@ def page(results: dict[str, dict[str, Any]], notes: str) -> str:
         missing = ", ".join(f"`{task}`" for task in GAITS if task not in results)
         lines += [f"Not run with five seeds so far: {missing}.", ""]
     for task, found in results.items():
-        lines += [f"## `{task}`", "", f"{found['recipe']}.", "", *table(HEADS, rows_of(found)), "",
+        more = [f"Corrected: {found['correction']}.", ""] if "correction" in found else []
+        lines += [f"## `{task}`", "", f"{found['recipe']}.", "", *more,
+                  *table(HEADS, rows_of(found)), "",
                   f"![Learning curves of {task}](pictures/gaits_{name_of(task)}.png)",
                   ""]  # fmt: skip
     return "\n".join([*lines, notes])
@@ -230,7 +261,7 @@ def main(argv: list[str] | None = None) -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--tasks", nargs="+", choices=GAITS, default=GAITS, metavar="TASK")
     parser.add_argument("--page", action="store_true", help="run nothing")
-    parser.add_argument("--others", action="store_true", help="but what was learned, as it is")
+    parser.add_argument("--others", action="store_true", help="what the recipe gave stays")
     parser.add_argument("--commands", action="store_true", help="how commands are followed, alone")
     parser.add_argument("--out", type=Path, default=ROOT / "runs" / "gaits")
     arguments = parser.parse_args(argv)
@@ -240,8 +271,11 @@ def main(argv: list[str] | None = None) -> None:
     results = json.loads(DATA.read_text(encoding="utf-8")) if DATA.is_file() else {}
     for task in [] if arguments.page else arguments.tasks:
         out = arguments.out / name_of(task)
-        again = {**results.get(task, {}), "others": others(task, out)}
-        results[task] = again if arguments.others else of_task(task, out)
+        if arguments.others:
+            again = {"others": others(task, out), **corrected(task, out)}
+            results[task] = {**results.get(task, {}), **again}
+        else:
+            results[task] = of_task(task, out)
         draw(task, results[task])
         DATA.write_text(json.dumps(results, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
     old = PAGE.read_text(encoding="utf-8") if PAGE.is_file() else ""

@@ -131,17 +131,27 @@ def test_a_control_period_can_be_any_number_of_updates(period):
 
 
 def test_who_acts_by_power_refuses_temperatures():
-    env = make(WALKING, disable_env_checker=True)
-    with pytest.raises(ValueError, match="action must be .*'power'"):
-        scripted(env)
-    with pytest.raises(ValueError, match="action must be .*'power'"):
-        GaitPolicy.in_task(env, WALK, (0.0,) * 4)
     with pytest.raises(ValueError, match="action must be .*'power'"):
         CourseWalker(bare("TCA/TetrapodCourse-v0"))
     with pytest.raises(ValueError, match=r"action must be one of .'temperature', 'power'."):
         BendReach(action="voltage")
     for id in IDS:
         assert scripted(make(id, **task_class(id).scripted_arguments)) is not None
+
+
+def test_a_gait_asks_for_its_temperatures_in_the_middle_of_the_time_for_which_they_are_held():
+    env = make(WALKING, control_period=0.4)
+    policy = GaitPolicy.in_task(env, WALK, (0.0,) * 4)
+    seen, _ = env.reset(seed=0)
+    for k in range(3):
+        action = policy.act(seen)
+        wanted = WALK.temperature((0.4 * k + 0.2) / WALK.period)
+        assert env.unwrapped.heated(action.astype(float))[:12] == pytest.approx(wanted, abs=1e-4)
+        seen, *_ = env.step(action)
+    policy.reset()
+    warmer = policy.act(seen, 1000.0)  # by more than is allowed
+    hot = env.unwrapped.hot_temperature
+    assert env.unwrapped.heated(warmer.astype(float))[:12] == pytest.approx([hot] * 12, abs=1e-4)
 
 
 def test_the_bounds_are_those_of_the_pages_for_the_usual_robots():

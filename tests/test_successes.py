@@ -55,13 +55,16 @@ def test_half_of_a_batch_is_what_the_script_did_with_success():
 
 
 def test_quicker_episodes_take_the_place_of_the_scripts_where_nearly_all_succeed():
-    buffer = memory(n_envs=1, kind="object")
+    buffer = memory(n_envs=2, kind="object")
 
     def lived(success, kind, length, mark):
+        """In the second environment; in the first, with noise, what is quickest counts nothing."""
         for k in range(length):
-            seen = np.full((1, 2), mark, np.float32)
-            info = {"success": success and k == length - 1, "object": kind}
-            buffer.add(seen, seen, seen[:, :1], np.zeros(1), np.array([k == length - 1]), [info])
+            last = k == length - 1
+            seen = np.array([[0.4] * 2, [mark] * 2], np.float32)
+            infos = [{"success": not buffer.showing, "object": kind},
+                     {"success": success and last, "object": kind}]  # fmt: skip
+            buffer.add(seen, seen, seen[:, :1], np.zeros(2), np.array([True, last]), infos)
 
     def marks(kind):
         shelf = buffer.examples[kind].shelf
@@ -149,6 +152,22 @@ def written(folder):
         name: [a.tobytes() for a in SavedPolicy.read(folder / name).network.weights]
         for name in ("best.npz", "last.npz")
     }
+
+
+def test_every_second_environment_is_driven_by_the_mean_without_noise(tmp_path):
+    run = Run(tiny(envs=4), RunFolder(tmp_path, tiny(envs=4), ""))
+    model = run.model
+    model._last_obs = np.random.default_rng(0).normal(size=(4, 50)).astype(np.float32)
+    model.averaged = {name: row * 0.9 for name, row in model.actor.state_dict().items()}
+    model.num_timesteps = 8
+    first, told = model._sample_action(8, None, 4)
+    again, _ = model._sample_action(8, None, 4)
+    assert (first == told).all()
+    assert (first[1::2] == again[1::2]).all() and (first[::2] != again[::2]).any(axis=1).all()
+    with model.at_its_mean():
+        mean, _ = model.predict(model._last_obs, deterministic=True)
+    np.testing.assert_array_equal(first[1::2], mean[1::2])
+    run.close()
 
 
 @pytest.mark.usefixtures("quick")

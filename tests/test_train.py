@@ -25,6 +25,7 @@ from tca_mj.agents.train import deep, gait_score
 from tca_mj.agents.train.config import OffPolicy, OnPolicy, TrainConfig, default_config
 from tca_mj.agents.train.deep import Run, exported, learner, train
 from tca_mj.agents.train.learning_env import LearningEnv
+from tca_mj.agents.train.mirrored import clock_mirror
 from tca_mj.agents.train.runs import RunFolder
 from tca_mj.agents.train.sb3_env import TaskVecEnv
 from tca_mj.agents.train.search import SearchConfig, search
@@ -371,6 +372,43 @@ def test_the_residual_learner_sees_and_does_what_the_policy_will():
     assert (row["success"], row["early_end"]) == (0.0, 0.0)
 
 
+def test_a_gait_and_its_clock_are_the_same_in_a_mirror():
+    """What a gait asks for at a phase is, in the mirror, what it asks for at the mirrored one."""
+    for name, gait in GAITS.items():
+        signs = np.sign(clock_mirror(gait))
+        shift = 0.0 if (signs > 0).all() else 0.5
+        assert (np.abs(clock_mirror(gait)) == [1, 2]).all() and abs(signs.sum()) == 2, name
+        for phase in (0.0, 0.13, 0.77):
+            swapped = GAIT_ACTION.mirrored(gait.temperature(phase))
+            np.testing.assert_allclose(gait.temperature(phase + shift), swapped, atol=1e-9)
+    askew = replace(GAITS["walk"], offset=(0.0, 0.4, 0.7, 0.2))
+    assert clock_mirror(askew) == ()
+
+
+@pytest.mark.usefixtures("quiet")
+def test_corrections_of_held_temperatures_are_learned_with_mirrored_memories(tmp_path, monkeypatch):
+    """What is learned acts as the learner did: on what is seen, the clock and the gait."""
+    monkeypatch.setattr(gym.spec(WALK), "max_episode_steps", 70)
+    config = default_config(WALK, "sac", residual=30.0, steps=32, interval=32, envs=2,
+                            evaluation_episodes=1)  # fmt: skip
+    config = replace(config, learner=replace(config.learner, learning_starts=8, batch_size=16))
+    assert config.mirrored and config.scaled and config.arguments["action"] == "temperature"
+    train(config, tmp_path, progress=False)
+    run = Run(config, RunFolder(tmp_path, config, ""))
+    memory = run.model.replay_buffer
+    assert memory._tables[0].size == run.test_env.observation_space.shape[0] + 2
+    policy = run.policy().make(run.test_env)
+    observation, _ = run.test_env.reset(seed=0, options=config.options)
+    policy.reset()
+    run.env.seed(0)
+    told, _ = run.model.predict(run.env.reset(), deterministic=True)
+    sent = []
+    monkeypatch.setattr(run.env.venv, "step_async", sent.append)
+    run.env.step_async(told)
+    np.testing.assert_allclose(sent[0][0], policy.act(observation), atol=2e-5)
+    run.close()
+
+
 @pytest.mark.usefixtures("quiet")
 @pytest.mark.parametrize(
     ("task", "algorithm"),
@@ -394,7 +432,7 @@ def test_every_task_has_a_default(task, algorithm, tmp_path):
         ({"algorithm": "dqn"}, "algorithm must be one of"),
         ({"algorithm": "sac"}, "learner must be OffPolicy, got OnPolicy"),
         ({"steps": 0}, "steps must be"),
-        ({"residual": 60.0}, "residual must be finite and at least 0 and at most 50 K"),
+        ({"residual": 110.0}, "residual must be finite and at least 0 and at most 100 K"),
         ({"residual": 10.0}, "which has no gait"),
         ({"centred": True}, "centred must be False where no gait makes the first steps"),
         ({"alike": True}, "alike must be False where memories are not mirrored"),

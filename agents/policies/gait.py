@@ -9,7 +9,7 @@ import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
-from tca_mj.checks import Checked, Finite, NotNegative, Positive, Temperature, door, require_one_of
+from tca_mj.checks import Checked, Finite, NotNegative, Positive, Temperature, door
 from tca_mj.control import Gait, Thermostat
 from tca_mj.envs.table import Table
 from tca_mj.registry import ControlPeriod
@@ -18,11 +18,11 @@ from tca_mj.tca import HeatSpec
 
 @dataclass(kw_only=True)
 class GaitPolicy(Checked):
-    """The power that makes the TCAs of legs as hot as a gait says, steered to a direction.
+    """What makes the TCAs of legs as hot as a gait says, steered to a direction.
 
-    It can act in every task with ``legs`` whose action is the power of their TCAs, leg by leg, and
-    which sees the rows "TCA temperature" and "commanded direction". Legs are left and right by
-    turns.
+    It can act in every task with ``legs`` whose action heats their TCAs, leg by leg, and which sees
+    the rows "TCA temperature" and "commanded direction". Legs are left and right by turns. Where an
+    action is a temperature that is held, it is that in the middle of that time.
 
     Attributes:
         gait: The gait.
@@ -34,6 +34,7 @@ class GaitPolicy(Checked):
         hottest: Temperature that corrections may not pass, unless the gait does [°C].
         control_period: Time between two actions [s].
         time: Time since the start [s].
+        asked: Temperatures that actions of -1 and of 1 ask for; None where they are power [°C].
 
     Raises:
         ValueError: If a field is not of its kind, the gait has an odd number of legs, or the
@@ -48,6 +49,7 @@ class GaitPolicy(Checked):
     hottest: Temperature
     control_period: ControlPeriod
     time: NotNegative = 0.0
+    asked: tuple[float, float] | None = None
     phase = "gait"
 
     def __post_init__(self) -> None:
@@ -67,16 +69,18 @@ class GaitPolicy(Checked):
         """A gait in an environment.
 
         Raises:
-            ValueError: If no gait can do the task, its legs are not those of the gait, or its
-                action is not the power of the TCAs.
+            ValueError: If no gait can do the task, or its legs are not those of the gait.
         """
         task: Any = env.unwrapped
-        require_one_of("action", task.heating, ("power",))
         if task.legs != gait.legs:
             raise ValueError(f"gait must have {task.legs} legs, got {gait.legs}")
         n = task.action.size
         heat = HeatSpec(capacity=task.heat.capacity[:n], loss=task.heat.loss[:n])
-        return cls.told_of(task, task.observation, heat, gait, steering)
+        walker = cls.told_of(task, task.observation, heat, gait, steering)
+        if task.heating == "temperature":
+            low, high = task.heated(np.array([-1.0, 1.0]))[:2].tolist()
+            walker.asked = low, high
+        return walker
 
     @classmethod
     def told_of(
@@ -108,7 +112,8 @@ class GaitPolicy(Checked):
                 makes hotter than both the gait and ``hottest`` is cut off there.
         """
         rows = self.seen.read(observation.astype(np.float64))
-        target = self.gait.temperature(self.time / self.gait.period).reshape(len(self._left), -1)
+        now = self.time + (0.5 * self.control_period if self.asked else 0.0)
+        target = self.gait.temperature(now / self.gait.period).reshape(len(self._left), -1)
         x, y = rows["commanded direction"]
         aside = np.arctan2(y, x)
         weaker = np.clip(np.array(self.steering) * aside, -80.0, 80.0)
@@ -117,6 +122,10 @@ class GaitPolicy(Checked):
         limit = np.maximum(target, self.hottest)
         self.time += self.control_period
         wanted = np.minimum(target + correction, limit)
-        power = self._thermostat.power(rows["TCA temperature"], wanted)
-        action = 2.0 * power / self.max_power - 1.0
+        if self.asked:
+            low, high = self.asked
+            action = 2.0 * (wanted - low) / (high - low) - 1.0
+        else:
+            power = self._thermostat.power(rows["TCA temperature"], wanted)
+            action = 2.0 * power / self.max_power - 1.0
         return np.clip(action, -1.0, 1.0).astype(np.float32)

@@ -10,7 +10,7 @@ from typing import Annotated, Any
 
 from tca_mj.agents.design import robot_of
 from tca_mj.checks import Checked, Positive, Share, door, number, require_one_of, shown, whole
-from tca_mj.envs.recipe import Recipe
+from tca_mj.envs.recipe import HELD, Recipe
 from tca_mj.registry import DEEP, Envs, recipes, task_class
 
 _STEPS = 500_000  # of a run if neither the caller nor the task says: a guess
@@ -190,7 +190,7 @@ class TrainConfig(Checked):
     centred: bool = False
     retold: bool = False
     growth: Mapping[str, Steps] = field(default_factory=dict)
-    residual: Annotated[float, partial(number, at_least=0.0, at_most=50.0, unit="K")] = 0.0
+    residual: Annotated[float, partial(number, at_least=0.0, at_most=100.0, unit="K")] = 0.0
     start: str = "random"
     successes: bool = False
     practised: Mapping[str, Any] = field(default_factory=dict)
@@ -259,17 +259,20 @@ class TrainConfig(Checked):
                     "arguments['action'] must be 'temperature' where a gait makes the first steps,"
                     f" got {shown(self.arguments)}"
                 )
-        if self.alike and (self.residual or self.retold or not self.mirrored):
+        if self.alike and (self.retold or not self.mirrored):
             raise ValueError(
-                "alike must be False where memories are not mirrored, are told with other commands"
-                " or a gait is corrected, got True"
+                "alike must be False where memories are not mirrored or are told with other"
+                " commands, got True"
             )
+        if self.retold and self.residual:
+            raise ValueError("retold must be False where a gait is corrected, got True")
         if self.centred and (self.residual or self.start == "random"):
             raise ValueError("centred must be False where no gait makes the first steps, got True")
-        if self.residual and self.arguments.get("action") != "power":
+        power = self.arguments.get("action", "temperature") == "power"
+        if self.residual and self.scaled == power:
             raise ValueError(
-                "arguments['action'] must be 'power' where a gait is corrected, got"
-                f" {shown(self.arguments)}"
+                "scaled must be True where a gait's temperatures are asked for and corrected, False"
+                f" where they are held by power, got {self.scaled}"
             )
 
     @property
@@ -301,9 +304,7 @@ def default_config(task: str, algorithm: str | None = None, **change: Any) -> Tr
     if any(change.get("options", {}).get(name) for name in recipe.growth):
         recipe = replace(recipe, **recipe.grown)
     if change.get("residual"):
-        recipe = Recipe(
-            steps=recipe.steps, action="power", options=recipe.options, start="scripted"
-        )
+        recipe = _correcting(recipe, algorithm)
     asked = {**change.pop("arguments", {})}
     arguments = {"action": recipe.action, **recipe.arguments} | asked
     period = asked.get("control_period") or recipe.control_period
@@ -336,6 +337,19 @@ def default_config(task: str, algorithm: str | None = None, **change: Any) -> Tr
     return TrainConfig(task=task, algorithm=algorithm, **common | change)
 
 
+def _correcting(recipe: Recipe, algorithm: str) -> Recipe:
+    """How a gait is corrected in a task that is learned from nothing by ``recipe``."""
+    if algorithm == "ppo":
+        return Recipe(
+            steps=recipe.steps, action="power", options=recipe.options, start="scripted"
+        )
+    return Recipe.held(
+        10_000, 0.2, discount=0.8, start="scripted", timestep=recipe.timestep, episodes=8,
+        options=recipe.options, mirrored=recipe.mirrored, alike=recipe.alike,
+        learner={**HELD, "ent_coef": "auto_0.02", "target_entropy": -18.0},
+    )  # fmt: skip
+
+
 def best_algorithm(task: str) -> str:
     """The algorithm that is best for a task, as far as that was tried; errors as ``task_class``."""
     return next(iter(recipes(task)), DEEP[0])
@@ -359,7 +373,10 @@ def described(config: TrainConfig) -> str:
         *(["left and right told the same"] if config.alike else []),
         *(["rewards from the gait's on"] if config.centred else []),
         *(["told with other commands"] if config.retold else []),
-        *([f"first steps by the gait '{config.start}'"] if config.start != "random" and task.legs
+        *([f"the gait '{config.start}' corrected by at most {config.residual:g} K"]
+          if config.residual
+          else [f"first steps by the gait '{config.start}'"]
+          if config.start != "random" and task.legs
           else ["first steps by the script"] if config.start != "random" else []),
         *(["half of each batch what that did with success"] if config.successes else []),
         *(f"{name} grown in {steps} steps" for name, steps in config.growth.items()),

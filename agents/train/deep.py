@@ -39,10 +39,11 @@ from tca_mj.agents.rollout import earned, rollout
 from tca_mj.agents.train.config import TrainConfig
 from tca_mj.agents.train.demonstrations import demonstrate, show
 from tca_mj.agents.train.learning_env import LearningEnv
-from tca_mj.agents.train.mirrored import mirrored_memory
+from tca_mj.agents.train.mirrored import clock_mirror, mirrored_memory
 from tca_mj.agents.train.runs import CURVE, RunFolder, drawn
 from tca_mj.agents.train.sb3_env import TaskVecEnv, silence
 from tca_mj.agents.train.successes import ImitatingSAC, SuccessReplayBuffer
+from tca_mj.control import Gait
 from tca_mj.files import PART, claimed
 from tca_mj.registry import make, task_class
 
@@ -177,7 +178,7 @@ class Run:
             self.normalise = VecNormalize(
                 self.env, norm_obs=running, norm_reward=running, gamma=config.learner.gamma
             )
-            self.model = learner(config, self.normalise)
+            self.model = learner(config, self.normalise, self._gait and self._gait[0])
         else:
             self.env.restore(state["env"])
             self.normalise = pickle.loads(state["normalise"])
@@ -195,6 +196,8 @@ class Run:
         self.test_env: gym.Env[Any, Any] = make(config.task, **config.made_with, **short)
         task: Any = self.test_env.unwrapped
         self._units = task.observation.units if config.scaled else None
+        if self._units is not None and self._gait:  # the clock comes as it is
+            self._units = np.column_stack([self._units, np.array([[0.0], [1.0]]).repeat(2, axis=1)])
         self._made_for = contract(self.test_env)
         if self.best and (apart := differences(self.best[1].made_for, self._made_for)):
             raise ValueError(f"{folder.path} holds a run in another task, {' | '.join(apart)}")
@@ -361,12 +364,14 @@ class _Falling:
         return self.first * (self.last + (1.0 - self.last) * left)
 
 
-def learner(config: TrainConfig, env: VecEnv) -> BaseAlgorithm:
+def learner(config: TrainConfig, env: VecEnv, gait: Gait | None = None) -> BaseAlgorithm:
     """A new model of Stable-Baselines3.
 
     Args:
         config: The settings.
         env: What it learns in; with mirrored memories round a ``TaskVecEnv``.
+        gait: The gait that is corrected; None for none. Where left and right legs do not step as in
+            a mirror, memories are not mirrored.
     """
     kind, settings = _kind(config), asdict(config.learner)
     network: dict[str, Any] = {"net_arch": list(settings["hidden"])}
@@ -377,10 +382,11 @@ def learner(config: TrainConfig, env: VecEnv) -> BaseAlgorithm:
     if kind is TD3:
         n = env.action_space.shape or (1,)
         settings["action_noise"] = NormalActionNoise(np.zeros(n), np.full(n, settings["noise"]))
-    if config.mirrored:
+    clock = clock_mirror(gait) if gait else ()
+    if config.mirrored and (clock or gait is None):
         assert isinstance(env.unwrapped, TaskVecEnv)
         settings |= mirrored_memory(
-            env.unwrapped, retold=config.retold, alike=config.alike, seed=config.seed
+            env.unwrapped, retold=config.retold, alike=config.alike, seed=config.seed, clock=clock
         )
     if config.successes:
         network["n_critics"] = settings["critics"]

@@ -12,9 +12,11 @@ from stable_baselines3.common.buffers import ReplayBuffer
 from stable_baselines3.common.type_aliases import ReplayBufferSamples
 
 from tca_mj.agents.train.sb3_env import TaskVecEnv
+from tca_mj.control import Gait
 from tca_mj.envs.table import Entry, Table
 
 _RETOLD = 5  # all but one in so many are told anew
+_TOGETHER = 0.02  # of a cycle, within which legs are taken to step as in a mirror; an estimate
 
 
 class MirroredReplayBuffer(ReplayBuffer):
@@ -103,8 +105,9 @@ class MirroredReplayBuffer(ReplayBuffer):
 
 
 def mirrored_memory(
-    tasks: TaskVecEnv, *, retold: bool = False, alike: bool = False, seed: int = 0
-) -> dict[str, Any]:
+    tasks: TaskVecEnv, *, retold: bool = False, alike: bool = False, seed: int = 0,
+    clock: tuple[int, ...] = (),
+) -> dict[str, Any]:  # fmt: skip
     """Arguments of an off-policy learner of Stable-Baselines3 whose memories are mirrored.
 
         SAC("MlpPolicy", tasks, **mirrored_memory(tasks))
@@ -115,6 +118,8 @@ def mirrored_memory(
         alike: Whether actions have a number for each pair of a left and a right one, which are
             then told the same.
         seed: Seed of those commands.
+        clock: What the mirror makes of sine and cosine of a gait's phase, as in ``Entry.mirror``,
+            where an observation ends with them; see ``clock_mirror``.
 
     Raises:
         ValueError: If observations are not scaled, or the task knows no mirror or no commands.
@@ -125,7 +130,9 @@ def mirrored_memory(
     for name, table in (("observation", task.observation), ("action", task.action)):
         if not table.symmetric:
             raise ValueError(f"tasks must know a mirror, got none in the table of its {name}")
-    action = task.action
+    seen, action = task.observation, task.action
+    if clock:
+        seen = Table([*seen.entries, Entry("clock", 2, -1.0, 1.0, "-", mirror=clock)])
     if alike:
         one = Entry("alike", int(action.pairs.max()) + 1, -1.0, 1.0, "-")
         action = Table([replace(one, mirror=tuple(range(1, one.size + 1)))])
@@ -135,7 +142,25 @@ def mirrored_memory(
     return {
         "replay_buffer_class": MirroredReplayBuffer,
         "replay_buffer_kwargs": {
-            "observation": task.observation, "action": action,
+            "observation": seen, "action": action,
             "retelling": retelling if retold else None, "seed": seed,
         },
     }  # fmt: skip
+
+
+def clock_mirror(gait: Gait) -> tuple[int, ...]:
+    """What a mirror that swaps left and right makes of sine and cosine of a gait's phase.
+
+    Args:
+        gait: A gait whose legs are left and right by turns.
+
+    Returns:
+        The same where left and right legs step together, their negatives where they are half a
+        cycle apart, as ``Entry.mirror``; empty where they are neither, to within a fiftieth of it.
+    """
+    left, right = np.array(gait.offset).reshape(-1, 2).T
+    for shift, mirror in ((0.0, (1, 2)), (0.5, (-1, -2))):
+        off = (right - left - shift + 0.5) % 1.0 - 0.5
+        if np.abs(off).max() <= _TOGETHER:
+            return mirror
+    return ()

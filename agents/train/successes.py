@@ -104,7 +104,8 @@ class SuccessReplayBuffer(ReplayBuffer):
     """A replay buffer whose batches are, in their first half, from episodes that were shown.
 
     Those are a script's that succeeded, and in their place, by and by, the learner's that were
-    better, see ``Examples``. All else that the learner does is in the other half only.
+    better, see ``Examples``: of the environments in which it acts without noise, see ``steady``.
+    All else that the learner does is in the other half only.
 
     An episode is remembered when it is over. A memory tells what its action and the next
     ``n_steps`` - 1 have earned, and what was seen then.
@@ -156,20 +157,22 @@ class SuccessReplayBuffer(ReplayBuffer):
             ended = bool(done[i]) and not info.get("TimeLimit.truncated", False)
             path.append((obs[i].copy(), action[i].copy(), next_obs[i].copy(), ended, reward[i]))
             if done[i]:
-                self._remember(self._told(path), info)
+                self._remember(self._told(path), info, steady(i))
                 self._paths[i] = []
 
-    def _remember(self, rows: list[NDArray[np.float32]], info: dict[str, Any]) -> None:
+    def _remember(
+        self, rows: list[NDArray[np.float32]], info: dict[str, Any], steadily: bool
+    ) -> None:
         """Keeps an episode, also as an example if it is one."""
         for row in rows:
             self.lived.add(row)
         success, kind = bool(info.get("success", False)), str(info.get(self.kind, ""))
         if kind not in self.examples:
             self.examples[kind] = Examples(self._room, self._width)
-        if not self.showing:
-            self.examples[kind].offer(rows, success)
-        elif success:
+        if self.showing and success:
             self.examples[kind].show(rows)
+        elif steadily and not self.showing:
+            self.examples[kind].offer(rows, success)
 
     def _told(self, path: list[tuple[Any, ...]]) -> list[NDArray[np.float32]]:
         """The memories of an episode."""
@@ -209,6 +212,11 @@ class SuccessReplayBuffer(ReplayBuffer):
         """Rows of memories as a batch."""
         parts = np.split(rows, self._edges, axis=1)
         return ReplayBufferSamples(*(self.to_torch(np.ascontiguousarray(part)) for part in parts))
+
+
+def steady(i: int) -> bool:
+    """Whether the learner acts without noise in an environment: in every second one."""
+    return i % 2 == 1
 
 
 def worth_of(
@@ -262,6 +270,19 @@ class ImitatingSAC(SAC):
         with torch.no_grad():
             spread.weight.mul_(0.01)
             spread.bias.fill_(_FIRST_SPREAD)
+
+    def _sample_action(
+        self, learning_starts: int, action_noise: Any = None, n_envs: int = 1
+    ) -> tuple[NDArray[Any], NDArray[Any]]:
+        """What is done next, also as it is remembered: where it is steady, what the mean does."""
+        action, told = super()._sample_action(learning_starts, action_noise, n_envs)
+        calm = [i for i in range(n_envs) if steady(i)]
+        if calm and self.num_timesteps >= learning_starts:
+            with self.at_its_mean():
+                seen: Any = self._last_obs
+                action[calm], _ = self.predict(seen[calm], deterministic=True)
+            told[calm] = self.policy.scale_action(action[calm])
+        return action, told
 
     def warm_up(self, steps: int) -> None:
         """Learns from what is remembered to act likewise, and then what that is worth."""

@@ -168,7 +168,7 @@ def _train(arguments: argparse.Namespace) -> int:
       tca-mj train {task} --out runs/learned
       tca-mj train TASK --option NAME=VALUE --steps 40000 --seeds 5 --out runs/five
       tca-mj train TASK --algo cma --start trot --seeds 3 --out runs/trot
-      tca-mj train TASK --algo ppo --residual 20 --steps 300000 --out runs/corrected
+      tca-mj train TASK --residual 40 --start GAIT --out runs/corrected
     """
     import tca_mj.agents.train.deep as training
     import tca_mj.agents.train.search as searching
