@@ -8,7 +8,8 @@ A table that is printed stands on the page with the same first row; where severa
 are told apart by their order. What is printed and stands nowhere is said, and ends it with code 1,
 as with --check does a table that differs in more than its columns and rows of times, or its
 roundings, which hang on the machine. Pages that a script of their own writes between marks are
-left out.
+left out. tests/tables.txt says of every table what holds it; one that is "printed" by a name and
+is not printed is said, too, and ends it with code 1.
 """
 
 import argparse
@@ -52,6 +53,7 @@ ELSEWHERE = {
 }  # fmt: skip
 TIMES = ("decision [ms]", "step [ms]")  # columns that hang on the machine, and rows:
 TIMED = ("env.step", "env.step over its physics")
+HOLDS = ROOT / "tests" / "tables.txt"
 ROUNDED = re.compile(r"^\| \| of these warned")  # the first row of a table that does
 TABLE = re.compile(r"^\|.*\n\|[-:| ]+\|\n(?:\|.*\n)*", re.MULTILINE)
 
@@ -59,6 +61,28 @@ TABLE = re.compile(r"^\|.*\n\|[-:| ]+\|\n(?:\|.*\n)*", re.MULTILINE)
 def first_row(table: str) -> str:
     """What tables are told apart by."""
     return re.sub(r"\s+", " ", table.partition("\n")[0])
+
+
+def holders() -> list[tuple[str, str, str]]:
+    """Page, what holds it and first row of every table in ``HOLDS``, in the order of the pages."""
+    found, page, kind = [], "", ""
+    for line in HOLDS.read_text(encoding="utf-8").splitlines():
+        deep = len(line) - len(line.lstrip())
+        if line.startswith("#") or not line.strip():
+            continue
+        if deep == 0:
+            page = line
+        elif deep == 2:
+            kind = line.strip()
+        else:
+            times, row = re.fullmatch(r" +(?:(\d+) x )?(\|.*)", line).groups()
+            found += int(times or 1) * [(page, kind, row)]
+    return found
+
+
+def stands_for(row: str, head: str) -> bool:
+    """Whether a row of ``HOLDS``, which may be cut off by an ellipsis, means a first row."""
+    return head.startswith(row[:-1].rstrip()) if row.endswith("…") else head == row
 
 
 def steady(table: str) -> list[list[str]]:
@@ -127,7 +151,15 @@ def held(name: str, asked: argparse.Namespace) -> bool:
         if head in differ and asked.check:
             said = "differs" if head in wrong else "differs in what hangs on the machine"
         print(f"  {said if head in there else 'on no page'}: {head}", flush=True)
-    return bool(printed) and there == printed.keys() and not (asked.check and wrong)
+    missing = [
+        row for _, kind, row in holders()
+        if kind == f"printed {name}" and not any(stands_for(row, head) for head in printed)
+    ]  # fmt: skip
+    for row in missing:
+        print(f"  not printed: {row}")
+    if asked.check:
+        missing += wrong
+    return bool(printed) and there == printed.keys() and not missing
 
 
 def main() -> int:
