@@ -36,6 +36,7 @@ PRINTED = {
     "finger": "finger_page.py --tables",
     "grasp": "grasp_page.py --tables",
     "learned-model": "learned_model_page.py --tables",
+    "models": "models_page.py",
     "morphing": "morphing_module.py --tables",
     "nodes": "node_table.py --nodes 4 6 8 10 12 16 --reference 48",
     "reach": "reach_page.py --tables",
@@ -51,7 +52,7 @@ ELSEWHERE = {
     "nodes": ("soft-bodies",), "rods": ("tetrapod-model",), "walk-limit": ("tetrapod",),
     "warnings": ("tetrapod",),
 }  # fmt: skip
-TIMES = ("decision [ms]", "step [ms]")  # columns that hang on the machine, and rows:
+TIMES = ("cost", "decision [ms]", "step [ms]")  # columns that hang on the machine, and rows:
 TIMED = ("env.step", "env.step over its physics")
 HOLDS = ROOT / "tests" / "tables.txt"
 ROUNDED = re.compile(r"^\| \| of these warned")  # the first row of a table that does
