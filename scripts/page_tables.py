@@ -30,7 +30,9 @@ PRINTED = {
     "beyond": "beyond_page.py --tables",
     "bistable": "bistable_page.py --tables",
     "bistable-gripper": "bistable_gripper_page.py --tables",
+    "cable": "cable_comparison.py",
     "certificate": "tetrapod_certificate.py rails bending legs gaits",
+    "chain": "chain_table.py",
     "coil-bvp": "conical_tca.py --table",
     "contacts": "tetrapod_contacts.py",
     "finger": "finger_page.py --tables",
@@ -47,12 +49,14 @@ PRINTED = {
     "warnings": "convexity_warnings.py",
 }
 ELSEWHERE = {
-    "bistable": ("bistable", "jump"), "certificate": ("tetrapod-model",),
+    "bistable": ("bistable", "jump"), "cable": ("soft-bodies",), "chain": ("soft-bodies",),
+    "certificate": ("tetrapod-model",),
     "contacts": ("tetrapod",),
     "nodes": ("soft-bodies",), "rods": ("tetrapod-model",), "walk-limit": ("tetrapod",),
     "warnings": ("tetrapod",),
 }  # fmt: skip
-TIMES = ("cost", "decision [ms]", "step [ms]")  # columns that hang on the machine, and rows:
+# Columns that hang on the machine, and rows:
+TIMES = ("cable: µs per step", "chain: µs per step", "cost", "decision [ms]", "step [ms]")
 TIMED = ("env.step", "env.step over its physics")
 HOLDS = ROOT / "tests" / "tables.txt"
 ROUNDED = re.compile(r"^\| \| of these warned")  # the first row of a table that does
