@@ -34,6 +34,7 @@ PRINTED = {
     "certificate": "tetrapod_certificate.py rails bending legs gaits",
     "chain": "chain_table.py",
     "coil-bvp": "conical_tca.py --table",
+    "commands": "gait_page.py --commands",
     "contacts": "tetrapod_contacts.py",
     "finger": "finger_page.py --tables",
     "grasp": "grasp_page.py --tables",
@@ -42,6 +43,7 @@ PRINTED = {
     "morphing": "morphing_module.py --tables",
     "nodes": "node_table.py --nodes 4 6 8 10 12 16 --reference 48",
     "reach": "reach_page.py --tables",
+    "replays": "shimmy_limit.py --replay",
     "rods": "tetrapod_certificate.py rods",
     "shape-memory": "shape_memory.py --tables",
     "tca": "tca_figures.py --tables",
@@ -50,10 +52,9 @@ PRINTED = {
 }
 ELSEWHERE = {
     "bistable": ("bistable", "jump"), "cable": ("soft-bodies",), "chain": ("soft-bodies",),
-    "certificate": ("tetrapod-model",),
-    "contacts": ("tetrapod",),
-    "nodes": ("soft-bodies",), "rods": ("tetrapod-model",), "walk-limit": ("tetrapod",),
-    "warnings": ("tetrapod",),
+    "certificate": ("tetrapod-model",), "commands": ("gaits",), "contacts": ("tetrapod",),
+    "nodes": ("soft-bodies",), "replays": ("gaits",), "rods": ("tetrapod-model",),
+    "walk-limit": ("tetrapod",), "warnings": ("tetrapod",),
 }  # fmt: skip
 # Columns that hang on the machine, and rows:
 TIMES = ("cable: µs per step", "chain: µs per step", "cost", "decision [ms]", "step [ms]")
