@@ -50,7 +50,7 @@ def table() -> str:
 
 
 def added_by_ends() -> str:
-    """What the ends of a hanging coil, one free to turn, add over the uniform helix; and in words."""
+    """What ends add to a coil that hangs free to turn, over the uniform helix; also in words."""
     made = CATALOGUE["free-stroke-made"]
     pieces = [made.of_length(made.rest_length * coils / made.coils) for coils in COILS]
     rows, added, less = [], [], {}
