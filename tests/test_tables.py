@@ -99,3 +99,34 @@ def test_every_page_that_is_listed_exists():
 def test_every_source_of_printed_tables_has_one():
     named = {kind.split()[1] for _, kind, _ in HOLDERS if kind.startswith("printed ")}
     assert named == set(SCRIPT["PRINTED"])
+
+
+def test_what_contacts_meet_follows_from_their_tables():
+    """The largest figures of rows, rounded as there; what was put down and timed is said apart."""
+    text = (ROOT / "docs" / "tetrapod.md").read_text(encoding="utf-8")
+    tables = {SCRIPT["first_row"](table): table for table, _ in found_on(text)}
+
+    def rows(head):
+        (table,) = (table for first, table in tables.items() if first.startswith(head))
+        lines = [line.strip("| ").split(" | ") for line in table.splitlines()[2:]]
+        return {first: " ".join(rest) for first, *rest in lines}
+
+    speeds, still, aims = rows("| | crawl, script"), rows("| | crawl | walk"), rows("| aim")
+
+    def most(*names):
+        return max(abs(float(x)) for name in names for x in re.findall(r"[-+]?\d+\.\d+", name))
+
+    deepest = most(speeds["deepest contact"], still["deepest under random actions"])
+    changed = [row for name, row in speeds.items() if name.endswith("halved and doubled")]
+    assert len(changed) == 5 and most(still["slide while standing for 20 s"]) < 0.1
+    told = {
+        "slide below": f"yes, {deepest:g} mm",
+        "half the time": f"yes, {most(speeds['half the time step over task']):g} %",
+        "within 5 %": f"yes, {most(speeds['task over hard, 0.5 ms']):g} %",
+        "every number": f"yes, {most(*changed):g} %",
+    }  # fmt: skip
+    for beginning, met in told.items():
+        (found,) = (said for aim, said in aims.items() if aim.startswith(beginning))
+        assert found.startswith(met), beginning
+    (found,) = (said for aim, said in aims.items() if aim.startswith("TCAs handed"))
+    assert round(most(found), 1) == most(speeds["task over TCAs in every step"])
