@@ -27,6 +27,7 @@ ROOT = Path(__file__).resolve().parent.parent
 # What prints the tables of pages, by a name; the pages are those of that name but for a few.
 PRINTED = {
     "adaptive-grasp": "adaptive_page.py --tables",
+    "arm": "success_table.py --tables --fresh",
     "beyond": "beyond_page.py --tables",
     "bistable": "bistable_page.py --tables",
     "bistable-gripper": "bistable_gripper_page.py --tables",
