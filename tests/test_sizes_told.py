@@ -323,3 +323,28 @@ def test_bounds_of_actions(task, page, which):
         figures = f"{env.safe_temperature:g} °C", f"{power[place]:g} W |"
         assert all(figure in f"{there[index]} |" for figure in figures), (index, figures)
     env.close()
+
+
+@pytest.mark.parametrize(
+    ("task", "page"),
+    [
+        ("ArmPickPlace", "arm"), ("MorphModule", "morphing"), ("BendReach", "reach"),
+        ("FingerSense", "finger"), ("Grasp", "grasp"), ("AdaptiveGrasp", "adaptive-grasp"),
+        ("BistableGrasp", "bistable-gripper"), ("Jump", "jump"), ("TetrapodWalk", "tetrapod"),
+    ],
+)  # fmt: skip
+def test_terms_and_prices_of_rewards(task, page):
+    """Each term has a row; what a joule, a hot kelvin and a bad end cost is said there."""
+    env = gym.make(f"TCA/{task}-v0", disable_env_checker=True).unwrapped
+    told = rows(page, "| term | value")
+    assert {*told} - {"term", "---"} == {*env.terms}
+    period = env.control_period
+    every = f"{period:g} s" if period >= 0.1 else f"{1e3 * period:g} ms"
+    assert told["energy"].startswith(f" -{env.energy_price:g} per joule")
+    if env.heat_price:
+        hot = f"above {env.hot_temperature:g} °C, every {every}"
+        assert told["heat"].startswith(f" -{env.heat_price:g} for each kelvin")
+        assert hot in told["heat"]
+    if env.end_price:
+        assert told["end"].startswith(f" -{env.end_price:g} ")
+    env.close()
