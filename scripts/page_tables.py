@@ -8,8 +8,8 @@ A table that is printed stands on the page with the same first row; where severa
 are told apart by their order. What is printed and stands nowhere is said, and ends it with code 1,
 as with --check does a table that differs in more than its columns and rows of times, or its
 roundings, which hang on the machine. Pages that a script of their own writes between marks are
-left out. tests/tables.txt says of every table what holds it; one that is "printed" by a name and
-is not printed is said, too, and ends it with code 1.
+left out, but for those that it prints as well. tests/tables.txt says of every table what holds it;
+one that is "printed" by a name and is not printed is said, too, and ends it with code 1.
 """
 
 import argparse
@@ -46,16 +46,20 @@ PRINTED = {
     "reach": "reach_page.py --tables",
     "replays": "shimmy_limit.py --replay",
     "rods": "tetrapod_certificate.py rods",
+    "sensitivity": "sensitivity.py",
     "shape-memory": "shape_memory.py --tables",
     "tca": "tca_figures.py --tables",
     "walk-limit": "walk_limit.py",
     "warnings": "convexity_warnings.py",
 }
+STUDIES = sorted(path.stem for path in (ROOT / "scripts").glob("study_*.py"))
+PRINTED |= {name: f"{name}.py --out build/studies" for name in STUDIES}
 ELSEWHERE = {
     "bistable": ("bistable", "jump"), "cable": ("soft-bodies",), "chain": ("soft-bodies",),
     "certificate": ("tetrapod-model",), "commands": ("gaits",), "contacts": ("tetrapod",),
     "nodes": ("soft-bodies",), "replays": ("gaits",), "rods": ("tetrapod-model",),
     "walk-limit": ("tetrapod",), "warnings": ("tetrapod",),
+    **dict.fromkeys(STUDIES, ("studies",)),
 }  # fmt: skip
 # Columns that hang on the machine, and rows:
 TIMES = ("cable: µs per step", "chain: µs per step", "cost", "decision [ms]", "step [ms]")

@@ -45,7 +45,7 @@ def fault(page, text, kind, table, mark):
             f'"{what}"' in path.read_text("utf-8") for path in (ROOT / "scripts").glob("*.py")
         )  # fmt: skip
         return "" if known and what in mark else f"no mark of {what}"
-    if mark:
+    if mark and how != "printed":
         return f"stands between the marks of {mark}"
     if how == "printed":
         name = page.rpartition("/")[2].removesuffix(".md")
