@@ -44,7 +44,11 @@ def fault(page, text, kind, table, mark):
         known = (ROOT / what).is_file() if what.startswith("scripts/") else any(
             f'"{what}"' in path.read_text("utf-8") for path in (ROOT / "scripts").glob("*.py")
         )  # fmt: skip
-        return "" if known and what in mark else f"no mark of {what}"
+        if not known or what not in mark:
+            return f"no mark of {what}"
+        name = page.rpartition("/")[2].removesuffix(".md")
+        writes = not what.startswith("scripts/") or name in (ROOT / what).read_text("utf-8")
+        return "" if writes else f"{what} does not know this page"
     if mark and how != "printed":
         return f"stands between the marks of {mark}"
     if how == "printed":
@@ -57,9 +61,13 @@ def fault(page, text, kind, table, mark):
         there = path.is_file() and f"def {test}(" in path.read_text("utf-8")
         return "" if there else f"no test {what}"
     if how == "command":
-        words = [word for word in what.split() if word.startswith(("scripts/", "tests/"))]
-        if what not in plain or not all((ROOT / word).is_file() for word in words):
+        files = [ROOT / word for word in what.split() if word.startswith(("scripts/", "tests/"))]
+        if what not in plain or not all(path.is_file() for path in files):
             return f"the page has no command {what}"
+        cells = SCRIPT["first_row"](table).strip("| ").split(" | ")
+        if any(path.parent.name == "scripts" and cell not in path.read_text("utf-8")
+               for path in files for cell in cells):  # fmt: skip
+            return f"{what} prints no such first row"
         return ""
     if how == "record":
         return "" if len(what) > 20 and what in plain else f"the page does not say {what}"
