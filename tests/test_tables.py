@@ -85,6 +85,8 @@ def test_every_table_is_held(page):
     name, text = page.relative_to(ROOT).as_posix(), page.read_text(encoding="utf-8")
     said = [(kind, row) for there, kind, row in HOLDERS if there == name]
     tables = found_on(text)
+    lines = re.findall(r"^ *\|.*$", FENCE.sub("", text), re.MULTILINE)
+    assert "".join(table for table, _ in tables).splitlines() == lines  # none in another form
     heads = [SCRIPT["first_row"](table) for table, _ in tables]
     # A table that is new, gone or elsewhere is found as the first row that differs.
     for i, head in enumerate(heads):
