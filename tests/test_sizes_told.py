@@ -4,6 +4,7 @@ Each row of a page is found by its first cell and must have the figures that sta
 as they are computed; what they mean and where they were printed is text.
 """
 
+import inspect
 import math
 import re
 
@@ -17,6 +18,7 @@ from test_tetrapod import extent
 import tca_mj
 from tca_mj.assets import mjcf
 from tca_mj.envs.gaits import TASKS
+from tca_mj.envs.vector import TaskVector
 from tca_mj.modules import continuum_leg as carbon
 from tca_mj.modules.bistable import BistableSpec
 from tca_mj.modules.innervated import InnervatedFingerSpec
@@ -288,6 +290,30 @@ def test_the_control_period():
         env = gym.make(id, disable_env_checker=True).unwrapped
         assert env.control_period == pytest.approx(named.get(id, 0.1)), id
         env.close()
+
+
+def test_the_vector_environment_has_the_arguments_of_its_page():
+    told = rows("vector", "| argument of `make_vec`")
+    parameters = inspect.signature(TaskVector.__init__).parameters
+    named = [name for name in parameters if name not in ("self", "task", "kwargs")]
+    assert [*told][1:-1] == named
+    assert told["num_envs"].startswith(f" {parameters['num_envs'].default} |")
+    mode = parameters["autoreset_mode"].default.value
+    assert told["autoreset_mode"].startswith(f" `{mode}` |")
+
+
+def test_infos_have_what_the_page_tells():
+    """Each key is one of some task's infos after a step; those after a step only are said so."""
+    told = rows("tasks", "| `info` | what")
+    keys = {key.strip() for cell in [*told][1:] for key in cell.split(",")}
+    seen = set()
+    for id in (task.id for task in TASK_ROWS):
+        env = gym.make(id, disable_env_checker=True).unwrapped
+        env.reset(seed=0)
+        *_, info = env.step(env.action_space.sample() * 0.0)
+        seen |= {*info}
+        env.close()
+    assert keys <= seen and len(keys) > 10
 
 
 def test_laws_of_a_tca_in_the_studies(monkeypatch):
