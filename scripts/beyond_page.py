@@ -28,6 +28,8 @@ from tca_mj import (
     pages,
     twist_morphing_module,
 )
+from tca_mj.certify.grids import lattices
+from tca_mj.certify.outcomes import Effort, outcomes
 from tca_mj.pages import folder_of_pictures
 from tca_mj.record.render import Offscreen, colour_tendons
 from tca_mj.smp import HOLD_TEMPERATURE, fixity
@@ -36,6 +38,16 @@ _COLD = 25.0  # [°C]
 _DOWN = (0.0, 1.0, 0.0, 0.0)  # half a turn about x
 _TWISTS, _SIDES = (-45.0, -90.0, -180.0), ((0.0, 60.0), (60.0, 90.0), (150.0, 120.0))
 _GRIDS = {"vault": (40.0, 0.0), "dome": (-30.0, -30.0), "saddle": (30.0, -30.0)}
+
+# What is compared with the theory of rods.
+CERTIFIED = {
+    "morphing": "the published module, soft", "morphing-cold": "fixed at 180°",
+    "morphing-twist": "soft", "morphing-twist-cold": "fixed at -90°", "morphing-3d": "soft",
+    "morphing-3d-cold": "fixed at 90° between two TCAs",
+    "grid-member": "soft, with a junction at its end",
+    "soft-finger": "finger of the adaptive gripper",
+    "adaptive-gripper": "its base hardened at 180°",
+}  # fmt: skip
 
 
 class Course:
@@ -237,9 +249,28 @@ def size_table() -> str:
         sim.step(np.zeros(sim.n), 0.5)
         taken = (time.process_time() - begin) / 100
         rows.append([f"{number} x {number}", f"{len(spec.members)}", f"{sim.n}",
-                     f"{sim.model.nv}", f"{sim.model.neq}", f"{1e3 * taken:.1f}"])  # fmt: skip
+                     f"{sim.model.nv}", f"{sim.model.neq}", f"{1e3 * taken:.2g}"])  # fmt: skip
     heads = ["junctions", "members, heaters", "TCAs", "joints", "loops", "step [ms]"]
     return "\n".join(pages.table(heads, rows))
+
+
+def certified_table(cases: int = 10) -> str:
+    """The worst of the first cases of each module against the theory of rods."""
+    found = outcomes(list(CERTIFIED), effort=Effort(cases, finer=0, runs=0, solvers=0))
+    rows = []
+    for name, what in CERTIFIED.items():
+        gaps = [one.gap for one in found[name] if one.gap is not None]
+        tip, turn = (max(getattr(gap, of) for gap in gaps) for of in ("position", "rotation"))
+        rows.append([f"`{name}`: {what}", f"{len(gaps)}", f"{100.0 * tip:.2f} %",
+                     f"{math.degrees(turn):.2f}°"])  # fmt: skip
+    return "\n".join(pages.table(["certified", "cases", "tip", "rotation"], rows))
+
+
+def lattice_table() -> str:
+    """What is known of soft grids."""
+    rows = [[case, against, f"{100.0 * error:.2g} %", f"{100.0 * bound:g} %"]
+            for case, against, error, bound in lattices()]  # fmt: skip
+    return "\n".join(pages.table(["soft grid", "compared with", "error", "bound"], rows))
 
 
 def draw_twist(path: Path) -> None:
@@ -279,7 +310,9 @@ def draw_sides(path: Path) -> None:
 def main() -> None:
     out = folder_of_pictures(__doc__, Path(__file__).parents[1] / "docs/pictures")
     if out is None:
-        for table in (turns_table, module_table, grid_table, size_table):
+        for table in (
+            turns_table, module_table, grid_table, size_table, certified_table, lattice_table
+        ):  # fmt: skip
             print(table(), end="\n\n", flush=True)
         return
     draw_twist(out / "beyond_twist.png")

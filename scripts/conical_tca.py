@@ -1,4 +1,8 @@
-"""Draws docs/pictures/tca_conical.png: a TCA on a cone turns inside out; --table prints heights."""
+"""Draws docs/pictures/tca_conical.png: a TCA on a cone turns inside out.
+
+With --table it prints the tables of docs/coil-bvp.md instead: what the ends of a coil add to its
+length, and heights of the conical TCA.
+"""
 
 import argparse
 from pathlib import Path
@@ -7,11 +11,14 @@ import numpy as np
 from matplotlib.figure import Figure
 from scipy.optimize import brentq
 
+from tca_mj.pages import table as markdown
 from tca_mj.record.plots import temperature_colour
+from tca_mj.tca import CATALOGUE, hanging_length
 from tca_mj.tca.fibre.boundary import FibreShape, solve_fibre
-from tca_mj.tca.fibre.centreline import CONICAL
+from tca_mj.tca.fibre.centreline import CONICAL, Centreline
 
 SHOWN = (25, 55, 70, 85, 100, 115, 130)  # [°C]
+COILS, WEIGHTS, COLD, HOT = (10, 20, 40, 63), (2, 30, 60), 25, 160  # [1], [g], [°C]
 
 
 def heated(temperature: float) -> FibreShape:
@@ -40,6 +47,33 @@ def table() -> str:
             f"| {t} | {z[-1]:.1f} | {np.ptp(z):.1f} | {100.0 * (1.0 - z[-1] / made):.0f} |"
         )
     return "\n".join(lines)
+
+
+def added_by_ends() -> str:
+    """What ends add to a coil that hangs free to turn, over the uniform helix; also in words."""
+    made = CATALOGUE["free-stroke-made"]
+    pieces = [made.of_length(made.rest_length * coils / made.coils) for coils in COILS]
+    rows, added, less = [], [], {}
+    for grams in WEIGHTS:
+        load, lengths = 9.81e-3 * grams, {}
+        for hot in (COLD, HOT):
+            uniform = np.array([hanging_length(tca, hot, load) for tca in pieces])
+            found = np.array([
+                -solve_fibre(Centreline.of_tca(tca), tca.fibre, hot, force=(0.0, 0.0, -load)).end[2]
+                for tca in pieces
+            ])  # fmt: skip
+            lengths[hot] = found, uniform
+            added.append(1e6 * (found - uniform))
+            rows.append([f"{grams} g, {hot} °C",
+                         *(f"{share:.2f} %" for share in 100.0 * (found / uniform - 1.0))])
+        (cold, cold_uniform), (warm, warm_uniform) = lengths[COLD], lengths[HOT]
+        less[grams] = 100.0 * (1.0 - (cold - warm) / (cold_uniform - warm_uniform))
+    said = "; ".join(f"{grams} g {', '.join(f'{x:.1f}' for x in less[grams])} %" for grams in less)
+    return "\n".join([
+        *markdown(["load, temperature", *(f"{coils} coils" for coils in COILS)], rows), "",
+        f"They add {np.min(added):.0f} to {np.max(added):.0f} µm.",
+        f"The contraction between the temperatures is smaller by: {said}.",
+    ])  # fmt: skip
 
 
 def draw(figure: Figure) -> None:
@@ -77,10 +111,10 @@ def draw(figure: Figure) -> None:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--out", type=Path, default=Path(__file__).parents[1] / "docs/pictures")
-    parser.add_argument("--table", action="store_true", help="print the table, draw nothing")
+    parser.add_argument("--table", action="store_true", help="print the tables, draw nothing")
     args = parser.parse_args()
     if args.table:
-        return print(table())
+        return print(added_by_ends(), table(), sep="\n\n")
     args.out.mkdir(parents=True, exist_ok=True)
     draw(figure := Figure(figsize=(11.0, 4.6), layout="constrained"))
     figure.savefig(args.out / "tca_conical.png", dpi=120)

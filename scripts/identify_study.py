@@ -28,7 +28,7 @@ from tca_mj.validation.residuals import residuals_picture
 
 CASES, ROWS = 200, 100
 DOCS = Path(__file__).resolve().parent.parent / "docs"
-HELD, GAINS = "intervals", "gains"
+HELD, GAINS = (f"scripts/identify_study.py: {what}" for what in ("intervals", "gains"))
 ORDER = ("stretch.csv", "length.csv", "force.csv", "step.csv", "resistance.csv")
 _THREAD = CATALOGUE["free-stroke"]
 _PLAIN = replace(_THREAD.fibre, load_softening=(0.0, 0.0, 1.0))

@@ -8,7 +8,8 @@ A table that is printed stands on the page with the same first row; where severa
 are told apart by their order. What is printed and stands nowhere is said, and ends it with code 1,
 as with --check does a table that differs in more than its columns and rows of times, or its
 roundings, which hang on the machine. Pages that a script of their own writes between marks are
-left out.
+left out, but for those that it prints as well. tests/tables.txt says of every table what holds it;
+one that is "printed" by a name and is not printed is said, too, and ends it with code 1.
 """
 
 import argparse
@@ -26,32 +27,44 @@ ROOT = Path(__file__).resolve().parent.parent
 # What prints the tables of pages, by a name; the pages are those of that name but for a few.
 PRINTED = {
     "adaptive-grasp": "adaptive_page.py --tables",
+    "arm": "success_table.py --tables --fresh",
     "beyond": "beyond_page.py --tables",
     "bistable": "bistable_page.py --tables",
     "bistable-gripper": "bistable_gripper_page.py --tables",
+    "cable": "cable_comparison.py",
     "certificate": "tetrapod_certificate.py rails bending legs gaits",
+    "chain": "chain_table.py",
     "coil-bvp": "conical_tca.py --table",
+    "commands": "gait_page.py --commands",
     "contacts": "tetrapod_contacts.py",
     "finger": "finger_page.py --tables",
     "grasp": "grasp_page.py --tables",
     "learned-model": "learned_model_page.py --tables",
+    "models": "models_page.py",
     "morphing": "morphing_module.py --tables",
     "nodes": "node_table.py --nodes 4 6 8 10 12 16 --reference 48",
     "reach": "reach_page.py --tables",
+    "replays": "shimmy_limit.py --replay",
     "rods": "tetrapod_certificate.py rods",
+    "sensitivity": "sensitivity.py",
     "shape-memory": "shape_memory.py --tables",
     "tca": "tca_figures.py --tables",
     "walk-limit": "walk_limit.py",
     "warnings": "convexity_warnings.py",
 }
+STUDIES = sorted(path.stem for path in (ROOT / "scripts").glob("study_*.py"))
+PRINTED |= {name: f"{name}.py --out build/studies" for name in STUDIES}
 ELSEWHERE = {
-    "bistable": ("bistable", "jump"), "certificate": ("tetrapod-model",),
-    "contacts": ("tetrapod",),
-    "nodes": ("soft-bodies",), "rods": ("tetrapod-model",), "walk-limit": ("tetrapod",),
-    "warnings": ("tetrapod",),
+    "bistable": ("bistable", "jump"), "cable": ("soft-bodies",), "chain": ("soft-bodies",),
+    "certificate": ("tetrapod-model",), "commands": ("gaits",), "contacts": ("tetrapod",),
+    "nodes": ("soft-bodies",), "replays": ("gaits",), "rods": ("tetrapod-model",),
+    "walk-limit": ("tetrapod",), "warnings": ("tetrapod",),
+    **dict.fromkeys(STUDIES, ("studies",)),
 }  # fmt: skip
-TIMES = ("decision [ms]", "step [ms]")  # columns that hang on the machine, and rows:
+# Columns that hang on the machine, and rows:
+TIMES = ("cable: µs per step", "chain: µs per step", "cost", "decision [ms]", "step [ms]")
 TIMED = ("env.step", "env.step over its physics")
+HOLDS = ROOT / "tests" / "tables.txt"
 ROUNDED = re.compile(r"^\| \| of these warned")  # the first row of a table that does
 TABLE = re.compile(r"^\|.*\n\|[-:| ]+\|\n(?:\|.*\n)*", re.MULTILINE)
 
@@ -59,6 +72,28 @@ TABLE = re.compile(r"^\|.*\n\|[-:| ]+\|\n(?:\|.*\n)*", re.MULTILINE)
 def first_row(table: str) -> str:
     """What tables are told apart by."""
     return re.sub(r"\s+", " ", table.partition("\n")[0])
+
+
+def holders() -> list[tuple[str, str, str]]:
+    """Page, what holds it and first row of every table in ``HOLDS``, in the order of the pages."""
+    found, page, kind = [], "", ""
+    for line in HOLDS.read_text(encoding="utf-8").splitlines():
+        deep = len(line) - len(line.lstrip())
+        if line.startswith("#") or not line.strip():
+            continue
+        if deep == 0:
+            page = line
+        elif deep == 2:
+            kind = line.strip()
+        else:
+            times, row = re.fullmatch(r" +(?:(\d+) x )?(\|.*)", line).groups()
+            found += int(times or 1) * [(page, kind, row)]
+    return found
+
+
+def stands_for(row: str, head: str) -> bool:
+    """Whether a row of ``HOLDS``, which may be cut off by an ellipsis, means a first row."""
+    return head.startswith(row[:-1].rstrip()) if row.endswith("…") else head == row
 
 
 def steady(table: str) -> list[list[str]]:
@@ -127,7 +162,15 @@ def held(name: str, asked: argparse.Namespace) -> bool:
         if head in differ and asked.check:
             said = "differs" if head in wrong else "differs in what hangs on the machine"
         print(f"  {said if head in there else 'on no page'}: {head}", flush=True)
-    return bool(printed) and there == printed.keys() and not (asked.check and wrong)
+    missing = [
+        row for _, kind, row in holders()
+        if kind == f"printed {name}" and not any(stands_for(row, head) for head in printed)
+    ]  # fmt: skip
+    for row in missing:
+        print(f"  not printed: {row}")
+    if asked.check:
+        missing += wrong
+    return bool(printed) and there == printed.keys() and not missing
 
 
 def main() -> int:

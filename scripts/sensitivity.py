@@ -212,14 +212,14 @@ def part(which: str, **changes: Any) -> Callable[[World], World]:
 
 def touching(owner: type, share: float) -> Callable[[World], World]:
     """The same spec with another share of the wall touched."""
-    plain = embedding.silicone_body
+    plain = embedding.in_silicone
 
-    def with_share(spec: TcaSpec, **given: Any) -> Any:
+    def with_share(spec: TcaSpec, **given: Any) -> TcaSpec:
         return plain(spec, **(given | {"touching": share}))
 
-    module = __import__(owner.__module__, fromlist=["silicone_body"])
+    module = __import__(owner.__module__, fromlist=["in_silicone"])
     return lambda world: replace(
-        world, patches=(*world.patches, (module, "silicone_body", with_share))
+        world, patches=(*world.patches, (module, "in_silicone", with_share))
     )
 
 

@@ -2,6 +2,8 @@
 
     python scripts/success_table.py                      20 seeds of each object, two processes
     python scripts/success_table.py --seeds 2 --fresh
+    python scripts/success_table.py --tables             the tables of docs/arm.md: rates, and times
+                                                         of phases on seeds 100 to 109; two minutes
 
 Every finished episode is one line of ``results.jsonl``; a second run goes on where the first one
 stopped. What was measured with other versions of the packages is not mixed in, but changes of the
@@ -19,12 +21,15 @@ import numpy as np
 
 from tca_mj.agents.demo import play
 from tca_mj.agents.progress import progress_bar
+from tca_mj.agents.scripts.arm import PHASES
 from tca_mj.agents.workers import Workers
 from tca_mj.envs.arm import OBJECTS
 from tca_mj.files import append_whole, claimed, write_whole
 from tca_mj.machine import machine, versions
+from tca_mj.pages import table as markdown
 
 TASK = "TCA/ArmPickPlace-v0"
+TIMED = range(100, 110)  # seeds on which phases are timed
 
 
 def run(case: tuple[str, int]) -> dict[str, Any]:
@@ -45,9 +50,23 @@ def kept(path: Path) -> dict[tuple[str, int], dict[str, Any]]:
     return found
 
 
-def table(results: Iterable[dict[str, Any]]) -> str:
-    """Results as Markdown: rates by object, then every episode."""
-    ordered = sorted(results, key=lambda r: (r["object"], r["seed"]))
+def phase_table(results: Iterable[dict[str, Any]]) -> str:
+    """Mean time of each phase by object [s], in Markdown; one that comes again is added up."""
+    found = list(results)
+    heads = ["mean time [s]", *PHASES[:-1], "until it rests", "median of all"]
+    rows = []
+    for kind in OBJECTS:
+        group = [r for r in found if r["object"] == kind]
+        times = [[sum(each["duration"] for each in r["phases"] if each["name"] == name)
+                  for name in PHASES] for r in group]  # fmt: skip
+        rows.append([kind, *(f"{x:.1f}" for x in np.mean(times, axis=0)),
+                     f"{np.median([r['duration'] for r in group]):.1f}"])  # fmt: skip
+    return "\n".join(markdown(heads, rows))
+
+
+def rates(results: Iterable[dict[str, Any]]) -> list[str]:
+    """How often objects are put into the cup, in Markdown."""
+    ordered = list(results)
     groups = {kind: [r for r in ordered if r["object"] == kind] for kind in OBJECTS}
     lines = [
         "| object | episodes | in the cup | held until released | duration [s] | energy [J]"
@@ -64,7 +83,14 @@ def table(results: Iterable[dict[str, Any]]) -> str:
                 f" | {_spread([_energy(r) for r in group])}"
                 f" | {_spread([_hottest(r) for r in group])} |"
             )
-    lines += [
+    return lines
+
+
+def table(results: Iterable[dict[str, Any]]) -> str:
+    """Results as Markdown: rates by object, then every episode."""
+    ordered = sorted(results, key=lambda r: (r["object"], r["seed"]))
+    lines = [
+        *rates(ordered),
         "",
         "Duration, energy and peak temperature: median (least to most).",
         "",
@@ -107,16 +133,18 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument("--workers", type=int, default=2, help="processes")
     parser.add_argument("--out", type=Path, default=Path("runs/success"), help="folder")
     parser.add_argument("--fresh", action="store_true", help="forget earlier results")
+    parser.add_argument("--tables", action="store_true", help="print the tables of docs/arm.md")
     arguments = parser.parse_args(argv)
 
     path = arguments.out / "results.jsonl"
     kinds = [arguments.object] if arguments.object else list(OBJECTS)
     cases = [(kind, seed) for seed in range(arguments.seeds) for kind in kinds]
+    timed = [(kind, seed) for seed in TIMED for kind in kinds] if arguments.tables else []
     try:
         with claimed(arguments.out):
             results = {} if arguments.fresh else kept(path)
             write_whole(path, b"".join(map(_line, results.values())))
-            missing = [(case,) for case in cases if case not in results]
+            missing = [(case,) for case in [*cases, *timed] if case not in results]
             bar = progress_bar(len(missing), unit="episodes")
             with bar, Workers(min(arguments.workers, len(missing))) as processes:
                 for _, result in processes.run(run, missing):
@@ -127,6 +155,10 @@ def main(argv: Sequence[str] | None = None) -> int:
         print(f"interrupted; run it again to go on from {path}", file=sys.stderr)
         return 130
 
+    if timed:
+        print("\n".join([*rates(results[case] for case in cases), "",
+                         phase_table(results[case] for case in timed)]))  # fmt: skip
+        return 0
     where = machine()
     said = table(results[case] for case in cases)
     report = (

@@ -1,5 +1,7 @@
 """Draws the figures of docs/tca.md, docs/pictures/tca_*.png; --tables prints tables instead."""
 
+import math
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -7,11 +9,18 @@ import numpy as np
 from matplotlib.figure import Figure
 from scipy.optimize import brentq
 
-from tca_mj.modules.bending import BendingSpec
+from tca_mj import pages
+from tca_mj.modules.bending import BendingSpec, bending_module
+from tca_mj.modules.finger import FingerPairSpec
+from tca_mj.modules.morphing import MorphingSpec
 from tca_mj.modules.twisting import TwistingSpec
 from tca_mj.pages import folder_of_pictures
 from tca_mj.record.plots import temperature_colour
-from tca_mj.tca import CATALOGUE, CoilRods, HeatStep, TcaBank, TcaSpec, coil_tension
+from tca_mj.rod import solve_static
+from tca_mj.routes import parallel
+from tca_mj.sim import Simulation
+from tca_mj.tca import CATALOGUE, CoilRods, HeatStep, TcaBank, TcaSpec, coil_tension, law_at
+from tca_mj.tca.embedding import CHANNEL_CONTACT
 
 COLOURS = {"type-0-180": "#56b4e9", "type-1-180": "#0072b2", "type-2-200": "#009e73",
            "free-stroke": "#d55e00", "self-coiled": "#8a4fa3"}  # fmt: skip
@@ -20,6 +29,8 @@ CASES = (  # TCA, load [g], final temperature [°C], reported contraction
     ("type-0-180", 40, 150, "24 mm"), ("type-1-180", 40, 150, "44 mm"),
     ("type-2-200", 10, 160, "55 %"), ("type-2-200", 10, 220, "55 %"),
     ("free-stroke", 30, 160, "-"), ("free-stroke", 60, 160, "-"))  # fmt: skip
+PASSIVE = 0.85 / 220.0  # printed modulus of a TCA neither heated nor loaded, over a hot one's [1]
+ALMOST_NONE = 1e-6
 
 
 def held_length(spec: TcaSpec, temperature: float, load: float = 0.0) -> float:
@@ -48,6 +59,84 @@ def tables() -> tuple[str, str]:
             start, end = (held_length(s, at, 9.81e-3 * grams) for at in (25.0, hot))
             lines[-1] += f" {1e3 * (start - end):.1f} mm, {100.0 * (1.0 - end / start):.0f} % |"
     return "\n".join(rows), "\n".join(lines)
+
+
+def embedding_table() -> str:
+    """How TCAs lie in their modules, and what heat gets out of them."""
+
+    def told(*tcas: TcaSpec) -> str:
+        found = {f"{tca.body.conductance:.2g} W/(m K)": 0 for tca in tcas if tca.body}
+        return ", ".join(found)
+
+    return "\n".join(pages.table(["where", "how it lies", "G per length", "kind"], [
+        ["bending module, morphing module", "loosely, in air",
+         told(BendingSpec().embedded, MorphingSpec().sheathed),
+         f"the gap is fitted, {CHANNEL_CONTACT:g} W/(m K): 2 W and 0.4 W bend the module by 120°"
+         " (Sun, Section 4.1.3)"],
+        ["gripper", "bent to a ring, it touches half round", told(FingerPairSpec().embedded),
+         "estimate, no fit"],
+        ["wrist", "in a tube that is wound with it, it touches all round",
+         told(TwistingSpec().embedded), "estimate, no fit"],
+    ]))  # fmt: skip
+
+
+def softer(spec: TcaSpec, share: float) -> TcaSpec:
+    """A TCA whose moduli are a share of its own."""
+    fibre = spec.fibre
+    return replace(
+        spec, fibre=replace(fibre, young=share * fibre.young, shear=share * fibre.shear)
+    )
+
+
+def heated_bend(power: float, shares: Sequence[float], conductance: float | None) -> float:
+    """Angle of the bending module after 2 s of a power on TCA 0 and a fifth of it on TCA 1 [deg].
+
+    Without gravity. ``shares`` are those of the TCAs' moduli, ``conductance`` is from a TCA to its
+    silicone, per length [W/(m K)], if it is another one.
+    """
+    part = bending_module()
+    part.spec.option.gravity = [0.0, 0.0, 0.0]
+    tcas = []
+    for tca, share in zip(part.tcas, shares, strict=True):
+        spec = softer(tca.spec, share)
+        if conductance is not None and spec.body is not None:
+            spec = replace(spec, body=replace(spec.body, conductance=conductance))
+        tcas.append(replace(tca, spec=spec))
+    part.tcas = tuple(tcas)
+    simulation = Simulation(part)
+    simulation.step([power, power / 5.0, 0.0], 2.0)
+    x, y, z = simulation.data.site("tip").xmat.reshape(3, 3)[:, 2]
+    return math.degrees(math.atan2(math.hypot(x, y), z))
+
+
+def antagonist_tables() -> tuple[str, str]:
+    """What TCAs that are not heated cost the bending module of its angle."""
+    rows = [
+        [name, *(f"{heated_bend(watts, (1.0, share, share), g):.0f}°" for watts in (2.0, 1.0))]
+        for name, share, g in (
+            ("the model", 1.0, None),
+            ("antagonists a fifth as stiff (0.2)", 0.2, None),
+            ("antagonists with the published passive modulus (0.85/220)", PASSIVE, None),
+            ("antagonists without tension (1e-6)", ALMOST_NONE, None),
+            ("the model, no heat lost (`conductance=1e-6`)", 1.0, ALMOST_NONE),
+        )
+    ]
+    heads = ["after 2 s, by the tip's tangent, no gravity", "2 W + 0.4 W", "1 W + 0.2 W"]
+    spec, tca = BendingSpec(), bending_module().tcas[0].spec
+    hot = law_at(tca, 100.0)
+
+    def bend(share: float) -> float:
+        third = law_at(softer(tca, share), 25.0) if share else 0.0
+        shape = solve_static(spec.body, parallel(3, spec.offset), [third, hot, hot])
+        return math.degrees(shape.bend_angle)
+
+    alone = bend(0.0)
+    held = [[name, f"{bend(share):.0f}°", f"{100.0 * (alone / bend(share) - 1.0):.0f} %"]
+            for name, share in (("as here", 1.0), ("a fifth as stiff", 0.2),
+                                ("published passive modulus", PASSIVE))]  # fmt: skip
+    held += [["no tension", f"{alone:.0f}°", ""], ["reported", "", "more than 40 %"]]
+    said = ["third TCA", "bend, no gravity", "without its tension, larger by"]
+    return "\n".join(pages.table(heads, rows)), "\n".join(pages.table(said, held))
 
 
 def draw_tension(figure: Figure) -> None:
@@ -113,7 +202,7 @@ def draw_heat(figure: Figure) -> None:
 def main() -> None:
     out = folder_of_pictures(__doc__, Path(__file__).parents[1] / "docs/pictures")
     if out is None:
-        return print(*tables(), sep="\n\n")
+        return print(*tables(), embedding_table(), *antagonist_tables(), sep="\n\n")
     for draw in (draw_tension, draw_stroke, draw_heat):
         draw(figure := Figure(figsize=(8.0, 4.3), layout="constrained"))
         for axis in figure.axes:

@@ -20,7 +20,10 @@ from tca_mj.certify import SUBJECTS
 from tca_mj.certify.outcomes import Effort
 from tca_mj.certify.report import certify
 from tca_mj.modules.bending import silicone_cylinder
+from tca_mj.modules.bistable import BistableSpec
+from tca_mj.modules.innervated import InnervatedFingerSpec
 from tca_mj.registry import TASKS, task_class
+from tca_mj.smp.lumped import TUBE_DIAMETER
 from tca_mj.tca import (
     CATALOGUE,
     MATERIALS,
@@ -311,6 +314,23 @@ def test_a_robot_that_a_muscle_does_not_fit_says_why():
         tca_mj.make(REACH, tca="nowhere.json")
     with pytest.raises(ValueError, match="robot must be a specification with a TCA, got"):
         with_tca(tca_mj.Helix(3e-3), "free-stroke")
+
+
+def test_the_page_says_which_muscles_are_too_thick_or_too_short():
+    text = (Path(__file__).parents[1] / "docs" / "own-muscle.md").read_text(encoding="utf-8")
+    table = text[text.index("| muscle | what refuses it |") :].partition("\n\n")[0]
+    tube, channel, stroke = table.splitlines()[2:5]
+    two = replace(CATALOGUE["free-stroke"], plies=Plies(strands=2))
+    assert f"two strands of the published coil, {2e3 * two.outer_radius:.2f} mm" in tube
+    # The channel's wall is what the offset leaves: half of the thickness less that.
+    wall = 0.5 * BistableSpec().thickness - BistableSpec().offset
+    assert f"thicker than {2e3 * wall:.1f} mm" in channel and "two strands" in channel
+    assert f"coil, {2e3 * COIL.outer_radius:.1f} mm |" in channel
+    assert f"thicker than {1e3 * TUBE_DIAMETER:.1f} mm" in tube
+    limit = 1.0 - InnervatedFingerSpec().cylinder.length / InnervatedFingerSpec().tca_length
+    assert f"{100.0 * limit:.0f} % or less: " in stroke
+    short = [name for name, tca in CATALOGUE.items() if tca.free_stroke <= limit]
+    assert f"or less: {', '.join(f'`{name}`' for name in short)} |" in stroke
 
 
 def test_the_commands_take_a_file(mine, tmp_path, capsys):

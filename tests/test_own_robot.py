@@ -5,6 +5,7 @@ import re
 import shlex
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -96,6 +97,26 @@ def test_the_page_can_be_followed(tmp_path, monkeypatch, capsys):
     for name in ("robot.rrd", "demo/rollout.rrd", "demo/rollout.csv", "learned/best.npz",
                  "two_modules.xml", "script/summary.md", "learned/eval/summary.md"):  # fmt: skip
         assert (tmp_path / name).stat().st_size > 200, name
+
+
+def test_rows_of_the_certificate_are_those_of_the_page(tmp_path, monkeypatch):
+    """Without simulations from the cold, which are no rows."""
+    (tmp_path / "two.py").write_text((EXAMPLES / "own_robot.py").read_text("utf-8"), "utf-8")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "path", [str(tmp_path), *sys.path])
+    text = PAGE.read_text(encoding="utf-8")
+    head, *rest = text[text.index("| hot | gravity") :].partition("\n\n")[0].splitlines()
+    rows = {tuple(cell.strip() for cell in row.split("|")[1:3]): row for row in rest[1:]}
+    assert len(rows) == 3
+
+    def shown(names, gravity):
+        return [replace(one, close=False) for one in CASES(names, gravity)
+                if (" + ".join(one.hot), " ".join(f"{g:g}" for g in one.gravity)) in rows]
+
+    monkeypatch.setattr(robots, "_asked", shown)
+    found = robots.certify_robot("two:two_modules", workers=1)["text"].splitlines()
+    assert {head, *rows.values()} <= set(found)
+    monkeypatch.delitem(sys.modules, "two")
 
 
 def _small_film(text):

@@ -52,3 +52,19 @@ def test_an_unknown_name_is_refused(monkeypatch, capsys):
     with pytest.raises(SystemExit):
         SCRIPT["main"]()
     assert "names must be among adaptive-grasp" in capsys.readouterr().err
+
+
+def test_every_constant_of_the_sensitivity_is_one_and_changes_something(monkeypatch):
+    """Also those that are patched into modules, which may have moved."""
+    monkeypatch.syspath_prepend(str(ROOT / "scripts"))
+    sensitivity = pytest.importorskip("sensitivity")
+    usual = sensitivity.World().with_tca()
+    for constant in sensitivity.CONSTANTS:
+        for text, change in constant.values:
+            world = change(sensitivity.World())
+            with world.patched():
+                inside = [spec.embedded for spec in (world.wrist, world.gripper)]
+                changed = world.with_tca() != usual
+                assert changed, (constant.name, text)
+            if constant.name.startswith("share of wall"):
+                assert inside != [spec.embedded for spec in (world.wrist, world.gripper)]
