@@ -145,6 +145,13 @@ class ArmPickPlace(SimulatedTask):
             30_000, 0.2, discount=0.85, interval=2000, start="scripted", successes=True,
             limit=12.0, episodes=24, arguments={"offsets": True},
             practised={"object": "screwdriver"},
+            alone={
+                "object=pcb": {"steps": 26_000, "discount": 0.9, "episodes": 150},
+                "object=screwdriver": {
+                    "steps": 20_000, "discount": 0.93, "episodes": 100,
+                    "learner": {"last_imitation": 0.6},
+                },
+            },
             learner={
                 "learning_rate": 5e-4, "batch_size": 256, "tau": 0.01, "ent_coef": "auto_0.05",
                 "learning_starts": 6000, "gradient_steps": 16, "hidden": (128, 128),

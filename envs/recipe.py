@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Annotated, Any
 
@@ -41,6 +41,8 @@ class Recipe(Checked):
         growth: Options that grow from 0 to the value that is given, and in how many steps. With one
             of them memories are also told with other commands, and mirrored front for rear.
         grown: Fields of this that are others where one of them is given.
+        alone: The same where an option has a value, as ``{"object=pcb": {"steps": 20_000}}``; what
+            of ``learner`` is named there comes on top of it.
         discount: What a reward is worth that comes a second later, above 0 up to 1; None for the
             learner's own, per step [1].
         start: Whose steps come first in the memory: those of a gait or script, as in
@@ -69,6 +71,7 @@ class Recipe(Checked):
     centred: bool = False
     growth: Mapping[str, int] = field(default_factory=dict)
     grown: Mapping[str, Any] = field(default_factory=dict)
+    alone: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     discount: _Discount | None = None
     start: str = "random"
     successes: bool = False
@@ -78,6 +81,22 @@ class Recipe(Checked):
     episodes: _Steps | None = None
     learner: Mapping[str, Any] = field(default_factory=dict)
     interval: _Steps | None = None
+
+    def given(self, options: Mapping[str, Any]) -> Recipe:
+        """The recipe where options are given.
+
+        Args:
+            options: Their values, by name.
+        """
+        found = self
+        if any(options.get(name) for name in self.growth):
+            found = replace(found, **self.grown)
+        for case, fields in self.alone.items():
+            name, _, value = case.partition("=")
+            if str(options.get(name)) == value:
+                learner = {**found.learner, **fields.get("learner", {})}
+                found = replace(found, **{**fields, "learner": learner})
+        return found
 
     @classmethod
     @door

@@ -282,6 +282,16 @@ def test_every_third_environment_practises():
     tasks.close()
 
 
+def test_a_recipe_has_settings_of_its_own_for_one_object():
+    both = default_config(ARM)
+    tool = default_config(ARM, options={"object": "screwdriver"})
+    board = default_config(ARM, options={"object": "pcb"}, steps=500)
+    assert (tool.learner.last_imitation, both.learner.last_imitation) == (0.6, 0.3)
+    assert replace(tool.learner, last_imitation=0.3, gamma=both.learner.gamma) == both.learner
+    assert [c.learner.gamma for c in (tool, board)] == pytest.approx([0.93**0.2, 0.9**0.2])
+    assert (board.steps, tool.steps, both.steps) == (500, 20_000, 30_000)  # what is asked for wins
+
+
 def test_what_a_run_is_asked_for_is_not_practised_otherwise():
     config = default_config(ARM, options={"object": "pcb"})
     assert config.practised == {} and default_config(ARM).practised == {"object": "screwdriver"}

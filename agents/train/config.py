@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, fields
 from functools import partial
 from typing import Annotated, Any
 
@@ -300,9 +300,7 @@ def default_config(task: str, algorithm: str | None = None, **change: Any) -> Tr
         require_one_of("change", name, [field.name for field in fields(TrainConfig)])
     known = task_class(task)
     algorithm = algorithm or best_algorithm(task)
-    recipe = recipes(task).get(algorithm, Recipe(steps=_STEPS))
-    if any(change.get("options", {}).get(name) for name in recipe.growth):
-        recipe = replace(recipe, **recipe.grown)
+    recipe = recipes(task).get(algorithm, Recipe(steps=_STEPS)).given(change.get("options", {}))
     if change.get("residual"):
         recipe = _correcting(recipe, algorithm)
     asked = {**change.pop("arguments", {})}
