@@ -146,9 +146,11 @@ class ArmPickPlace(SimulatedTask):
             limit=12.0, episodes=24, arguments={"offsets": True},
             practised={"object": "screwdriver"},
             alone={
-                "object=pcb": {"steps": 26_000, "discount": 0.9, "episodes": 150},
+                "object=pcb": {
+                    "steps": 26_000, "discount": 0.9, "episodes": 150, "learner": {"steady": True},
+                },
                 "object=screwdriver": {
-                    "steps": 20_000, "discount": 0.93, "episodes": 100,
+                    "steps": 24_000, "discount": 0.93, "episodes": 60,
                     "learner": {"last_imitation": 0.6},
                 },
             },

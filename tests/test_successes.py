@@ -55,7 +55,7 @@ def test_half_of_a_batch_is_what_the_script_did_with_success():
 
 
 def test_quicker_episodes_take_the_place_of_the_scripts_where_nearly_all_succeed():
-    buffer = memory(n_envs=2, kind="object")
+    buffer = memory(n_envs=2, kind="object", steady=True)
 
     def lived(success, kind, length, mark):
         """In the second environment; in the first, with noise, what is quickest counts nothing."""
@@ -154,8 +154,11 @@ def written(folder):
     }
 
 
+@pytest.mark.usefixtures("quick")
 def test_every_second_environment_is_driven_by_the_mean_without_noise(tmp_path):
-    run = Run(tiny(envs=4), RunFolder(tmp_path, tiny(envs=4), ""))
+    config = tiny(envs=4)
+    config = replace(config, learner=replace(config.learner, steady=True))
+    run = Run(config, RunFolder(tmp_path, config, ""))
     model = run.model
     model._last_obs = np.random.default_rng(0).normal(size=(4, 50)).astype(np.float32)
     model.averaged = {name: row * 0.9 for name, row in model.actor.state_dict().items()}
@@ -167,6 +170,9 @@ def test_every_second_environment_is_driven_by_the_mean_without_noise(tmp_path):
     with model.at_its_mean():
         mean, _ = model.predict(model._last_obs, deterministic=True)
     np.testing.assert_array_equal(first[1::2], mean[1::2])
+    model.steady = False
+    first, again = (model._sample_action(8, None, 4)[0] for _ in range(2))
+    assert (first != again).any(axis=1).all()
     run.close()
 
 
@@ -288,8 +294,9 @@ def test_a_recipe_has_settings_of_its_own_for_one_object():
     board = default_config(ARM, options={"object": "pcb"}, steps=500)
     assert (tool.learner.last_imitation, both.learner.last_imitation) == (0.6, 0.3)
     assert replace(tool.learner, last_imitation=0.3, gamma=both.learner.gamma) == both.learner
+    assert (board.learner.steady, tool.learner.steady, both.learner.steady) == (True, False, False)
     assert [c.learner.gamma for c in (tool, board)] == pytest.approx([0.93**0.2, 0.9**0.2])
-    assert (board.steps, tool.steps, both.steps) == (500, 20_000, 30_000)  # what is asked for wins
+    assert (board.steps, tool.steps, both.steps) == (500, 24_000, 30_000)  # what is asked for wins
 
 
 def test_what_a_run_is_asked_for_is_not_practised_otherwise():

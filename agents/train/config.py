@@ -100,6 +100,8 @@ class OffPolicy(Checked):
         imitation: Weight of what was shown where half of each batch is from there, 0 to 1000, see
             ``tca_mj.agents.train.successes`` [1].
         last_imitation: Share of it that is left at the end, to which it falls by and by [1].
+        steady: Whether the actor's mean drives every second environment, without noise, whose
+            quicker successes alone are imitated; only where something is shown.
         critics: How many there are, 2 to 100; more than 2 only where something is shown.
         use_sde: Whether noise depends on what is seen (gSDE); not of TD3.
         noise: Standard deviation of TD3's actions, above 0 up to 1 [1]; the others find their own.
@@ -123,6 +125,7 @@ class OffPolicy(Checked):
     n_steps: Few = 1
     imitation: Annotated[float, partial(number, at_least=0.0, at_most=1000.0)] = 0.0
     last_imitation: Share = 0.02
+    steady: bool = False
     critics: Annotated[int, partial(whole, at_least=2, at_most=100)] = 2
     use_sde: bool = False
     noise: Part = 0.1
@@ -231,6 +234,8 @@ class TrainConfig(Checked):
             imitation, n_steps = self.learner.imitation, self.learner.n_steps  # type: ignore[union-attr]
             if imitation and not self.successes:
                 raise ValueError(f"learner.imitation must be 0 without successes, got {imitation}")
+            if self.learner.steady and not self.successes:  # type: ignore[union-attr]
+                raise ValueError("learner.steady must be False without successes, got True")
             critics = self.learner.critics  # type: ignore[union-attr]
             if critics != 2 and not self.successes:
                 raise ValueError(f"learner.critics must be 2 without successes, got {critics}")

@@ -393,7 +393,7 @@ def learner(config: TrainConfig, env: VecEnv, gait: Gait | None = None) -> BaseA
         settings["replay_buffer_class"] = SuccessReplayBuffer
         settings["replay_buffer_kwargs"] = {
             "n_steps": settings.pop("n_steps"), "gamma": settings["gamma"],
-            "kind": next(iter(config.practised), ""),
+            "kind": next(iter(config.practised), ""), "steady": settings["steady"],
         }  # fmt: skip
     known = inspect.signature(kind).parameters
     model: BaseAlgorithm = kind(
@@ -403,6 +403,7 @@ def learner(config: TrainConfig, env: VecEnv, gait: Gait | None = None) -> BaseA
     if isinstance(model, ImitatingSAC):
         model.imitation = settings["imitation"]
         model.last_imitation = settings["last_imitation"]
+        model.steady = settings["steady"]
     return model
 
 

@@ -104,8 +104,7 @@ class SuccessReplayBuffer(ReplayBuffer):
     """A replay buffer whose batches are, in their first half, from episodes that were shown.
 
     Those are a script's that succeeded, and in their place, by and by, the learner's that were
-    better, see ``Examples``: of the environments in which it acts without noise, see ``steady``.
-    All else that the learner does is in the other half only.
+    better, see ``Examples``. All else that the learner does is in the other half only.
 
     An episode is remembered when it is over. A memory tells what its action and the next
     ``n_steps`` - 1 have earned, and what was seen then.
@@ -116,12 +115,13 @@ class SuccessReplayBuffer(ReplayBuffer):
         lived: All memories. A row is an observation, an action, the observation after ``n_steps``,
             whether the episode has ended by then, what was earned and the discount of what comes.
         examples: What is imitated, by kind.
+        steady: Whether the learner's are examples only where it acts without noise.
     """
 
     def __init__(
         self, buffer_size: int, observation_space: Any, action_space: Any, device: Any = "auto",
         n_envs: int = 1, *, n_steps: int = 1, gamma: float = 0.99, kind: str = "",
-        **kwargs: Any,
+        steady: bool = False, **kwargs: Any,
     ) -> None:  # fmt: skip
         """Takes the arguments of ``ReplayBuffer``, and those of its ``NStepReplayBuffer``.
 
@@ -134,6 +134,7 @@ class SuccessReplayBuffer(ReplayBuffer):
             n_steps: Steps whose rewards a memory adds up.
             gamma: Discount per step [1].
             kind: What in a task's info tells kinds of episodes apart; "" for nothing.
+            steady: As ``OffPolicy.steady``.
             **kwargs: As for ``ReplayBuffer``.
         """
         super().__init__(1, observation_space, action_space, device, 1, **kwargs)
@@ -143,7 +144,7 @@ class SuccessReplayBuffer(ReplayBuffer):
         width = int(self._edges[-1]) + 1
         self.lived = Shelf(buffer_size, width)
         self._room, self._width = buffer_size, width
-        self.showing, self.kind = False, kind
+        self.showing, self.kind, self.steady = False, kind, steady
         self.examples: dict[str, Examples] = {}
         self._paths: list[list[tuple[Any, ...]]] = [[] for _ in range(n_envs)]
 
@@ -157,11 +158,11 @@ class SuccessReplayBuffer(ReplayBuffer):
             ended = bool(done[i]) and not info.get("TimeLimit.truncated", False)
             path.append((obs[i].copy(), action[i].copy(), next_obs[i].copy(), ended, reward[i]))
             if done[i]:
-                self._remember(self._told(path), info, steady(i))
+                self._remember(self._told(path), info, not self.steady or calm(i))
                 self._paths[i] = []
 
     def _remember(
-        self, rows: list[NDArray[np.float32]], info: dict[str, Any], steadily: bool
+        self, rows: list[NDArray[np.float32]], info: dict[str, Any], offered: bool
     ) -> None:
         """Keeps an episode, also as an example if it is one."""
         for row in rows:
@@ -171,7 +172,7 @@ class SuccessReplayBuffer(ReplayBuffer):
             self.examples[kind] = Examples(self._room, self._width)
         if self.showing and success:
             self.examples[kind].show(rows)
-        elif steadily and not self.showing:
+        elif offered and not self.showing:
             self.examples[kind].offer(rows, success)
 
     def _told(self, path: list[tuple[Any, ...]]) -> list[NDArray[np.float32]]:
@@ -214,8 +215,8 @@ class SuccessReplayBuffer(ReplayBuffer):
         return ReplayBufferSamples(*(self.to_torch(np.ascontiguousarray(part)) for part in parts))
 
 
-def steady(i: int) -> bool:
-    """Whether the learner acts without noise in an environment: in every second one."""
+def calm(i: int) -> bool:
+    """Whether a steady learner acts without noise in an environment: in every second one."""
     return i % 2 == 1
 
 
@@ -243,10 +244,12 @@ class ImitatingSAC(SAC):
         imitation: Weight of the squared distance from actions that were shown, in units of the
             reward, at the beginning [1].
         last_imitation: Share of it that is left at the end [1].
+        steady: Whether it acts without noise in every second environment, as its mean.
     """
 
     imitation: float = 0.0
     last_imitation: float = 0.02
+    steady: bool = False
     averaged: dict[str, torch.Tensor]
     replay_buffer: SuccessReplayBuffer
 
@@ -274,14 +277,14 @@ class ImitatingSAC(SAC):
     def _sample_action(
         self, learning_starts: int, action_noise: Any = None, n_envs: int = 1
     ) -> tuple[NDArray[Any], NDArray[Any]]:
-        """What is done next, also as it is remembered: where it is steady, what the mean does."""
+        """What is done next, also as it is remembered."""
         action, told = super()._sample_action(learning_starts, action_noise, n_envs)
-        calm = [i for i in range(n_envs) if steady(i)]
-        if calm and self.num_timesteps >= learning_starts:
+        those = [i for i in range(n_envs) if self.steady and calm(i)]
+        if those and self.num_timesteps >= learning_starts:
             with self.at_its_mean():
                 seen: Any = self._last_obs
-                action[calm], _ = self.predict(seen[calm], deterministic=True)
-            told[calm] = self.policy.scale_action(action[calm])
+                action[those], _ = self.predict(seen[those], deterministic=True)
+            told[those] = self.policy.scale_action(action[those])
         return action, told
 
     def warm_up(self, steps: int) -> None:
