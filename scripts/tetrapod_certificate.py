@@ -397,7 +397,10 @@ def rods(seconds: float = 60.0) -> list[str]:
             for who in WHO:
                 env = TetrapodGait(gait=name, action="power", robot=robot)
                 learned = who == "searched"
-                policy = load_policy(f"tetrapod-{name}", env, other_robot=True) if learned else gait_policy(name)
+                policy = (
+                    load_policy(f"tetrapod-{name}", env, other_robot=True) if learned
+                    else gait_policy(name)
+                )  # fmt: skip
                 observation, info = env.reset(seed=0)
                 done = False
                 while info["time"] < seconds - 1e-9 and not done:
