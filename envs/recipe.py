@@ -82,11 +82,15 @@ class Recipe(Checked):
     learner: Mapping[str, Any] = field(default_factory=dict)
     interval: _Steps | None = None
 
+    @door
     def given(self, options: Mapping[str, Any]) -> Recipe:
         """The recipe where options are given.
 
         Args:
             options: Their values, by name.
+
+        Raises:
+            ValueError: If ``options`` is no mapping.
         """
         found = self
         if any(options.get(name) for name in self.growth):

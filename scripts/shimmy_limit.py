@@ -5,12 +5,14 @@
     python scripts/shimmy_limit.py --replay              held for longer, in other cycles
     python scripts/shimmy_limit.py --replay --gait FILE  another gait, in its own task, held so
     python scripts/shimmy_limit.py --free 12 14          any temperatures, in cycles of so many
+    python scripts/shimmy_limit.py --free 14 --robot 1008  the same on one of the 16 robots
 
 Prints tables of docs/gaits.md. Gaits ask for temperatures every 0.2 s, for those in the middle of
 each time. On single robots CMA-ES begins with the gait that ships and looks for speed alone,
 whatever it costs, over whole cycles; then both gaits walk that robot for 60 s from cold. Free of
 any form, each pair of TCAs has a temperature for each 0.4 s of a cycle; the search begins with
-those of the shipped gait or policy, on the robot that is off by nothing. Physics runs at 10 ms.
+those of the shipped gait or policy, on the robot that is off by nothing unless another is named.
+Physics runs at 10 ms.
 """
 
 from __future__ import annotations
@@ -140,10 +142,13 @@ def program_of(name: str, cycle: int) -> Array:
     return np.clip(asked.reshape(cycle, 2, 2, 3)[:, :, 0], -1.0, 1.0).reshape(cycle, 6)
 
 
-def marched(vector: Any, programs: Sequence[Array], duration: float) -> Array:
-    """Way of each program on the robot that is off by nothing, (decisions + 1, programs) [m]."""
+def marched(
+    vector: Any, programs: Sequence[Array], duration: float, robot: int | None = None
+) -> Array:
+    """Way of each program on a robot, (decisions + 1, programs); None is off by nothing [m]."""
+    off = 0.0 if robot is None else 0.2
     for i in range(len(programs)):
-        vector.restart(i, seed=0)
+        vector.restart(i, seed=robot or 0, options={"randomise": off})
     ways = [np.zeros(len(programs))]
     for step in range(round(duration / STEP)):
         asked = np.stack([both_sides(each[step % len(each)]) for each in programs])
@@ -152,7 +157,7 @@ def marched(vector: Any, programs: Sequence[Array], duration: float) -> Array:
     return np.array(ways)
 
 
-def freed(name: str, cycle: int, generations: int) -> list[str]:
+def freed(name: str, cycle: int, generations: int, robot: int | None = None) -> list[str]:
     """A row of the table of programs of any form: how fast the first one is, and the best."""
     first, begun = program_of(name, cycle), time.process_time()
     optimiser = CMA(mean=first.ravel(), sigma=FREE_SIGMA, seed=0,
@@ -163,7 +168,7 @@ def freed(name: str, cycle: int, generations: int) -> list[str]:
     for generation in range(generations):
         points = [optimiser.ask() for _ in range(FREE_POPULATION)]
         programs = [point.reshape(cycle, 6) for point in [*points, np.array(optimiser.mean)]]
-        ways = marched(vector, programs, STEP * last)
+        ways = marched(vector, programs, STEP * last, robot)
         found = (ways[last] - ways[warm]) / (STEP * (last - warm))
         optimiser.tell([(p, -1e3 * v) for p, v in zip(points, found[:-1], strict=True)])
         if found[-1] > best[0]:
@@ -172,8 +177,9 @@ def freed(name: str, cycle: int, generations: int) -> list[str]:
             print(f"{name}, {cycle}: {generation}, {1e3 * found[-1]:.2f} mm/s", flush=True)
     vector.close()
     vector = tasks(2, STEP)
-    speeds = marched(vector, [first, best[1]], WHOLE)[-1] / WHOLE
+    speeds = marched(vector, [first, best[1]], WHOLE, robot)[-1] / WHOLE
     vector.close()
+    name += "" if robot is None else f", robot {robot}"
     return [name, f"{STEP * cycle:.1f} s", f"{1e3 * speeds[0]:.2f}", f"{1e3 * speeds[1]:.2f}",
             f"{1e3 * best[0]:.2f}", f"{(time.process_time() - begun) / 60.0:.0f}"]  # fmt: skip
 
@@ -221,13 +227,15 @@ def main(argv: list[str] | None = None) -> None:
     parser.add_argument("--replay", action="store_true", help="nothing is sought")
     parser.add_argument("--gait", metavar="FILE", help="another gait, with --replay")
     parser.add_argument("--free", type=int, nargs="+", metavar="DECISIONS", help="of a cycle")
+    parser.add_argument("--robot", type=int, choices=ROBOTS, metavar="SEED", help="of --free")
     parser.add_argument("--begin", default=START, help="policy that a free search begins with")
     arguments = parser.parse_args(argv)
     if arguments.free:
         print("\n".join(table(
             ["begun with", "cycle", "as it begins, 60 s [mm/s]", "best, 60 s", "best, whole cycles",
              "processor time [min]"],
-            [freed(arguments.begin, cycle, arguments.generations) for cycle in arguments.free],
+            [freed(arguments.begin, cycle, arguments.generations, arguments.robot)
+             for cycle in arguments.free],
         )))  # fmt: skip
         return
     if arguments.gait:

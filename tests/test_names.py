@@ -97,7 +97,7 @@ INTERNAL = {
     "tca_mj.agents.train": {
         "config": "best_algorithm described", "deep": "Run exported film learner record",
         "demonstrations": "*", "gait_score": "*", "learning_env": "*", "runs": "*",
-        "sb3_env": "silence", "successes": "*",
+        "mirrored": "clock_mirror", "sb3_env": "silence", "successes": "*",
     },
 }  # fmt: skip
 # Packages that are an arrangement of files: what they have for users, the package above offers.

@@ -38,7 +38,7 @@ class GaitPolicy(Checked):
 
     Raises:
         ValueError: If a field is not of its kind, the gait has an odd number of legs, or the
-            steering another number.
+            steering another number, or ``asked`` falls.
     """
 
     gait: Gait
@@ -56,6 +56,8 @@ class GaitPolicy(Checked):
         Checked.__post_init__(self)
         if self.gait.legs % 2:
             raise ValueError(f"gait must have legs by twos, got {self.gait.legs}")
+        if self.asked and not self.asked[0] < self.asked[1]:
+            raise ValueError(f"asked must rise from -1 to 1, got {self.asked}")
         if np.shape(self.steering) not in ((), (self.gait.legs,)):
             raise ValueError(f"steering must have {self.gait.legs} numbers, got {self.steering}")
         self._thermostat = Thermostat(heat=self.heat, max_power=self.max_power)
