@@ -15,7 +15,7 @@ from tca_mj.agents.train.deep import Run, train
 from tca_mj.agents.train.runs import RunFolder
 from tca_mj.agents.train.sb3_env import TaskVecEnv
 from tca_mj.agents.train.successes import SuccessReplayBuffer
-from tca_mj.registry import make
+from tca_mj.registry import TASKS, make, recipes
 
 ARM = "TCA/ArmPickPlace-v0"
 GAMMA, STEPS = 0.9, 3
@@ -286,6 +286,20 @@ def test_every_third_environment_practises():
         assert [tasks.tasks.envs[i].object for i in (0, 3)] == ["pcb", "pcb"]
         tasks.step(still)
     tasks.close()
+
+
+def test_cases_of_recipes_are_options_of_their_tasks():
+    """A case with a slip would be passed over in silence."""
+    found = [
+        (task.id, *case.split("=")) for task in TASKS
+        for recipe in recipes(task.id).values() for case in recipe.alone
+    ]  # fmt: skip
+    assert found
+    for id, name, value in found:
+        env = make(id, disable_env_checker=True)
+        setup = env.unwrapped.options.setup(np.random.default_rng(0), {name: value})
+        assert str(setup[name]) == value
+        env.close()
 
 
 def test_a_recipe_has_settings_of_its_own_for_one_object():

@@ -80,6 +80,8 @@ class LearningEnv(VecEnvWrapper):
             actions = actions[:, self.pairs]
         if self._walkers:
             changes = self._bound * actions.astype(np.float64)
+            # Scaled or not: of what is seen a gait that asks for temperatures reads the commanded
+            # direction alone, whose scale is 1, and one that sets power is never scaled.
             each = zip(self._walkers, self._seen, changes, strict=True)
             actions = np.stack([walker.act(seen, change) for walker, seen, change in each])
         self.venv.step_async(actions)
