@@ -296,18 +296,27 @@ def test_spines_go_on_pulling_once_they_are_rigid_only_where_the_robot_clings(cl
 
 
 @pytest.mark.parametrize(
-    ("speeds", "first", "at_last"),
-    [((2.0, 9.0), 0, 0), ((0.2, 1.5, 9.0), 1, 1), ((0.2, 0.9, 0.5), 1, 1)],
+    ("speeds", "pace", "first", "at_last"),
+    [
+        ((2.0, 9.0), 1e-3, 0, 0),
+        ((0.2, 1.5, 9.0), 1e-3, 1, 1),
+        ((0.2, 0.9, 0.5), 1e-3, 1, 1),
+        ((2.1, 2.8, 9.0), (3e-3, 1e-3), 1, 1),  # the third only where both are as slow as 1
+        ((2.8, 2.1, 9.0), (3e-3, 1e-3), 1, 0),
+        ((0.8, 0.9, 2.0), (3e-3, 1e-3), 1, 2),
+        ((3.1, 9.0, 9.0), (3e-3, 1e-3), 0, 0),
+    ],
 )
 def test_the_first_gait_that_keeps_the_pace_is_kept_and_else_the_fastest(
-    speeds, first, at_last, shared
+    speeds, pace, first, at_last, shared
 ):
-    """Speeds in mm/s, where 1 is wanted; each is tried for 20 s."""
-    stage = Go(name="shimmy", gait=(STEP,) * len(speeds), until=9.0, pace=1e-3)
+    """Speeds in mm/s; each is tried for 20 s."""
+    gaits = (STEP,) * len(speeds)
+    stage = Go(name="shimmy", gait=gaits, until=9.0, pace=pace)
     walker, x = CourseWalker(shared, (stage, stage)), 0.0
     for step in range(2000):
         walker._time = 0.1 * step
-        walker._judge(x, stage.pace, len(speeds))
+        walker._judge(x, gaits, stage.pace)
         x += 1e-4 * speeds[walker._choice]
         if step == 399:
             assert walker._choice == first
@@ -318,6 +327,15 @@ def test_the_first_gait_that_keeps_the_pace_is_kept_and_else_the_fastest(
     walker.act(shared.seen())
     assert walker.phase == "shimmy" and walker._number == 1 and seen["position"][0] > -9.0
     assert (walker._choice, walker._headway) == (at_last, found)
+
+
+def test_a_pace_is_for_all_gaits_or_for_each_but_the_first():
+    with pytest.raises(ValueError, match="pace must be 1 numbers, one for each gait but the first"):
+        Go(name="shimmy", gait=(STEP, STEP), until=9.0, pace=(1e-3, 1e-3))
+    with pytest.raises(ValueError, match="pace must be a number or a row of numbers"):
+        Go(name="shimmy", gait=(STEP, STEP), until=9.0, pace=((1e-3,),))
+    with pytest.raises(ValueError, match="pace must be finite and at least 0"):
+        Go(name="shimmy", gait=(STEP, STEP), until=9.0, pace=-1e-3)
 
 
 def test_the_crawl_goes_forward_and_the_walk_is_faster():

@@ -1,8 +1,10 @@
 """Policies as files: what is saved acts alike when it is read, and needs no training code."""
 
+import itertools
 import json
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import gymnasium as gym
@@ -186,6 +188,57 @@ def test_impossible_networks_are_refused(change, message):
     Network(**good)
     with pytest.raises(ValueError, match=message):
         Network(**good | change)
+
+
+SIDES = (np.array([1, 0, 2, 3]), np.array([1.0, 1.0, -1.0, 1.0], np.float32))  # of what is seen
+PLACES = (np.array([2, 1, 0]), np.array([-1.0, 1.0, -1.0], np.float32))  # of what is done
+
+
+@pytest.mark.parametrize("widths", [(), (5,), (6, 5)])
+@pytest.mark.parametrize("squash", ["clip", "tanh"])
+def test_a_network_made_alike_does_in_a_mirror_what_is_seen_there(widths, squash):
+    random, sizes = np.random.default_rng(3), (4, *widths, 3)
+    layers = list(itertools.pairwise(sizes))
+    one = Network(
+        weights=tuple(random.normal(size=(b, a)) for a, b in layers),
+        biases=tuple(random.normal(size=b) for _, b in layers),
+        mean=np.zeros(4), var=np.ones(4), squash=squash, activation="relu",
+        units=np.array([[2.0, 2.0, 0.0, 1.0], [3.0, 3.0, 1.0, 0.5]]),
+        bounds=np.array([[-0.5, -0.1, -0.7], [0.7, 0.2, 0.5]]),
+    )  # fmt: skip
+    (source, sign), (place, side) = SIDES, PLACES
+    both = one.alike(SIDES, PLACES)
+    for seen in random.normal(size=(20, 4)).astype(np.float32):
+        image = seen[source] * sign
+        np.testing.assert_allclose(both(image), both(seen)[place] * side, atol=1e-6)
+        assert not np.allclose(one(image), one(seen)[place] * side, atol=1e-3)
+        # Who does so already stays as it is.
+        np.testing.assert_allclose(both.alike(SIDES, PLACES)(seen), both(seen), atol=1e-6)
+    free = replace(one, squash="clip", bounds=np.array([[-1e3] * 3, [1e3] * 3]))
+    np.testing.assert_allclose(  # the mean of what it asks for here and of that in the mirror
+        free.alike(SIDES, PLACES)(seen), (free(seen) + free(image)[place] * side) / 2.0, atol=1e-5
+    )
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"mean": np.array([1.0, 0.0, 0.0, 0.0])}, "mean must be the same in the mirror"),
+        ({"mean": np.array([0.0, 0.0, 1.0, 0.0])}, "mean must be the same in the mirror"),
+        ({"var": np.array([1.0, 2.0, 1.0, 1.0])}, "var must be the same in the mirror"),
+        ({"units": np.array([[0.0] * 4, [1.0, 2.0, 1.0, 1.0]])}, "units must be the same"),
+        ({"bounds": np.array([[-1.0, -1.0, -0.5], [1.0] * 3])}, "bounds must be the same"),
+    ],
+)
+def test_a_network_of_unlike_sides_is_not_made_alike(change, message):
+    one = Network(weights=(np.ones((3, 4)),), biases=(np.zeros(3),), mean=np.zeros(4),
+                  var=np.ones(4))  # fmt: skip
+    with pytest.raises(ValueError, match=message):
+        replace(one, **change).alike(SIDES, PLACES)
+    with pytest.raises(ValueError, match="action must mirror 3 numbers, got 4"):
+        one.alike(SIDES, SIDES)
+    with pytest.raises(ValueError, match="observation must mirror 4 numbers, got 3"):
+        one.alike(PLACES, PLACES)
 
 
 def test_a_policy_loads_without_what_trained_it(tmp_path):

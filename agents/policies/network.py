@@ -3,14 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Annotated, Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tca_mj.checks import Checked, NotNegative, Numbers, Positive, require_one_of, within
+from tca_mj.checks import (
+    Checked,
+    NotNegative,
+    Numbers,
+    Positive,
+    door,
+    require_one_of,
+    shown,
+    within,
+)
+from tca_mj.envs.table import Mirror
 
 Floats: TypeAlias = NDArray[np.float32]
 
@@ -126,3 +136,52 @@ class Network(Checked):
         if self.squash == "tanh":
             hidden = low + 0.5 * (np.tanh(hidden) + 1.0) * (high - low)
         return np.clip(hidden, low, high).astype(np.float32)
+
+    @door
+    def alike(self, observation: Mirror, action: Mirror) -> Network:
+        """A network that in a mirror does what is seen of it there: right as left, left as right.
+
+        What it asks for before that is squashed is the mean of what this one asks for and of the
+        image of what this one asks for in the mirror. It is twice as wide.
+
+        Args:
+            observation: The mirror of what it sees, ``Table.mirror``.
+            action: That of what it does.
+
+        Raises:
+            ValueError: If a mirror has another length, or normalisation, units or bounds are not
+                their own image in it.
+        """
+        (source, sign), (place, side) = observation, action
+        for name, size, row in (("observation", self.inputs, source),
+                                ("action", self.outputs, place)):  # fmt: skip
+            if len(row) != size:
+                raise ValueError(f"{name} must mirror {size} numbers, got {len(row)}")
+        images: dict[str, tuple[Any, Any]] = {
+            "mean": (self.mean, self.mean[source] * sign), "var": (self.var, self.var[source]),
+        }  # fmt: skip
+        if self.units is not None:
+            centre, scale = self.units
+            images["units"] = self.units, np.array([centre[source] * sign, scale[source]])
+        if self.bounds is not None:
+            low, high = self.bounds[:, place]
+            ends = np.where(side > 0.0, low, -high), np.where(side > 0.0, high, -low)
+            images["bounds"] = self.bounds, np.array(ends)
+        for name, (own, image) in images.items():
+            if not np.array_equal(own, image):
+                raise ValueError(f"{name} must be the same in the mirror, got {shown(own)}")
+        first, last = self.weights[0], self.weights[-1]
+        seen = np.empty_like(first)
+        seen[:, source] = first * sign
+        if len(self.weights) == 1:
+            weights: list[Any] = [0.5 * (first + seen[place] * side[:, None])]
+        else:
+            weights = [
+                np.concatenate((first, seen)),
+                *(np.kron(np.eye(2, dtype=np.float32), weight) for weight in self.weights[1:-1]),
+                0.5 * np.concatenate((last, last[place] * side[:, None]), axis=1),
+            ]  # fmt: skip
+        end = self.biases[-1]
+        biases: list[Any] = [np.tile(bias, 2) for bias in self.biases[:-1]]
+        biases.append(0.5 * (end + end[place] * side))
+        return replace(self, weights=tuple(weights), biases=tuple(biases))

@@ -10,15 +10,15 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tca_mj.agents.scripts.tetrapod import CRAWL, SHIMMY, WALK
-from tca_mj.checks import Checked, Edge, NotNegative, door
+from tca_mj.checks import Checked, Edge, door, shown, within
 from tca_mj.control import Gait, Thermostat
 from tca_mj.envs.course import OBSERVATION, Places, TetrapodCourse
-from tca_mj.envs.gaits import TASKS
 from tca_mj.robots.tetrapod import SPINES
 
 Array = NDArray[np.float64]
@@ -49,6 +49,19 @@ _LIFTED = (165.0, _OFF, _OFF)
 _REACHING = (165.0, 165.0, _OFF)  # a leg lifted and bent forward
 
 
+Row = tuple[float, ...]
+
+
+def _paces(name: str, value: Any) -> float | Row:
+    pace = within(name, value, at_least=0.0)
+    if pace.ndim > 1:
+        raise ValueError(f"{name} must be a number or a row of numbers, got {shown(value)}")
+    return tuple(pace.tolist()) if pace.ndim else float(pace)
+
+
+Paces = Annotated[float | Row, _paces]
+
+
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Go(Checked):
     """Move with a gait until the middle of the body is at ``until`` [m].
@@ -62,8 +75,9 @@ class Go(Checked):
         patience: Time without headway after which the stage ends wherever the body is [s].
         steers: Whether the legs of one side become weaker where the heading is off.
         above: Height of what the robot stands on, of which a learned gait sees its own [m].
-        pace: Headway below which the next gait is tried, and once all were, the fastest of them
-            [m/s]; 0 to try another only where there is none.
+        pace: Headway below which another gait is tried, one number for all or one for each but
+            the first; where no other is tried, the fastest goes on [m/s]. 0 to try another only
+            where there is no headway.
         clings: Whether the spines' TCAs go on pulling: without them a rigid U gives way by a
             degree, which is all that weak ones have clamped by.
     """
@@ -74,8 +88,15 @@ class Go(Checked):
     patience: Edge = math.inf
     steers: bool = False
     above: float = 0.0
-    pace: NotNegative = 0.0
+    pace: Paces = 0.0
     clings: bool = False
+
+    def __post_init__(self) -> None:
+        Checked.__post_init__(self)
+        others = len(self.gait) - 1 if isinstance(self.gait, tuple) else 0
+        if isinstance(self.pace, tuple) and len(self.pace) != others:
+            raise ValueError(f"pace must be {others} numbers, one for each gait but the first, got"
+                             f" {shown(self.pace)}")  # fmt: skip
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -95,6 +116,7 @@ class Bend(Checked):
         stiff: Temperature of the spines below which the legs go on. The TCAs hold the shape until
             they are below ``CourseWalker.rigid`` [°C].
         rest: Time after that in which the legs come back where they were braced, or stand [s].
+        short: By how much the bend may fall short where the TCAs can do no more [rad].
     """
 
     name: str
@@ -107,6 +129,7 @@ class Bend(Checked):
     brisk: bool = False
     stiff: float = 75.0
     rest: float = 10.0
+    short: float = math.radians(8.0)
 
 
 @door
@@ -149,7 +172,7 @@ class CourseWalker:
     soft = 116.0  # spines are hot enough to be bent [°C]
     rigid = 75.0  # spines are cold enough to be let go [°C]
     warm = 80.0  # spines are warmed to this ahead of a change of shape, and still rigid [°C]
-    walkable = TASKS["walk"].bend  # less bent its belly lies on the beam's end [rad]
+    walkable = math.radians(100.0)  # less bent its belly may lie on the beam's lower end [rad]
     easing = 0.3  # by which the TCAs cool while spines that cool fast become stiff [K/s]
     clinging = 0.05  # the same of rigid ones that still pull [K/s]
     hottest = 172.0  # temperature that no TCA is to exceed [°C]
@@ -206,6 +229,7 @@ class CourseWalker:
         self._integral = 0.0
         self._target = 25.0  # of the spines' TCAs
         self._angle: float | None = None
+        self._back = False  # whether the body has opened too far and is bent back
 
     def act(self, observation: NDArray[np.float32]) -> NDArray[np.float32]:
         """The next action."""
@@ -243,7 +267,7 @@ class CourseWalker:
         if isinstance(stage, Go):
             x = float(seen["position"][0])
             if stage.pace and isinstance(stage.gait, tuple):
-                self._judge(x, stage.pace, len(stage.gait))
+                self._judge(x, stage.gait, stage.pace)
             if x > self._best + 2e-3:
                 self._best, self._since = x, self._time
                 self._tried = self._tried if stage.pace else self._time
@@ -260,17 +284,20 @@ class CourseWalker:
         return bool(now and isinstance(before, Go) and isinstance(now[0], Go) and before.pace
                     and now[0].gait == before.gait)  # fmt: skip
 
-    def _judge(self, x: float, pace: float, gaits: int) -> None:
-        """Goes on with the gait, the next one, or the fastest of all that were tried."""
+    def _judge(self, x: float, gaits: Sequence[Gait | str], paces: float | Row) -> None:
+        """Goes on with the gait, another one, or the fastest of all that were tried."""
         if math.isnan(self._from):
             self._from = x
         if self._time - self._tried < self.trial:
             return
         found = self._headway
         found[self._choice] = (x - self._from) / (self._time - self._tried)
-        if found[self._choice] < pace:
-            left = [each for each in range(gaits) if each not in found]
-            self._choice = left[0] if left else max(found, key=found.__getitem__)
+        self._choice = max(found, key=found.__getitem__)
+        other = len(found)  # the first that was not tried
+        if other < len(gaits):
+            pace = paces[other - 1] if isinstance(paces, tuple) else paces
+            if found[self._choice] < pace:
+                self._choice = other
         self._from, self._tried = x, self._time
 
     def _walk(self, stage: Go, seen: dict[str, Array]) -> Array:
@@ -327,10 +354,13 @@ class CourseWalker:
                     stepping = abs(error) > 3.0
                     # As far as it gets: a TCA that is off lets go no further, a hot one is spent.
                     spent = self._target < 26.0 if stage.braced else self._target >= self.hottest
-                    near = abs(error) < (5.0 if not spent else 50.0 if stage.braced else 8.0)
+                    short = 50.0 if stage.braced else math.degrees(stage.short)
+                    near = abs(error) < (short if spent else 5.0)
                     # Opened further than asked it need not be bent back, but to where it walks.
                     opened = stage.brisk and stage.braced and error > 0.0
                     near = near or (opened and angle > self.walkable)
+                    # Curled legs would hold it open, and stretched ones without steps, too.
+                    self._back = self._back or (opened and angle < self.walkable)
                     still = near and abs(rate) < np.radians(1.0)
                     if (still and self._time > 5.0) or self._time > 60.0:
                         self._go_on("hold")
@@ -355,9 +385,9 @@ class CourseWalker:
             legs[2:] = _LIFTED if lifting else _REACHING
             if self._part == "bend" and self._time > 4.0:  # they shake the body level
                 legs = WALK.temperature(self._time / WALK.period).reshape(4, 3)
-        elif stage.braced and self._part != "release":
+        elif stage.braced and self._part != "release" and not self._back:
             legs[:] = _BRACED
-        elif stepping and stage.steps is not None:
+        elif (stepping or self._back) and stage.steps is not None:
             legs = stage.steps.temperature(self._time / stage.steps.period).reshape(4, 3)
         return legs, self._target, voltage
 

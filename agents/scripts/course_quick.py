@@ -79,13 +79,14 @@ def quick(places: Places, gaits: Mapping[str, Any]) -> tuple[Go | Bend, ...]:
         # A robot that falls back as it comes to lie on the beam needs a minute to make up for it.
         Go(name="mount", gait=gaits["mount"], until=edge + station + 0.004, patience=90.0,
            steers=True),
-        Bend(name="clamp", angle=math.radians(213.0), reaching=True, ahead=0.01, **brisk),
+        Bend(name="clamp", angle=math.radians(220.0), short=math.radians(15.0), reaching=True,
+             ahead=0.01, **brisk),
         Go(name="shimmy", until=end - 0.005, patience=200.0, **astride),
         Go(name="step off", until=end + station - 0.015, patience=60.0, **astride),
         *(
             Bend(name="open", angle=math.radians(angle), steps=STEP, braced=True, enough=wide,
                  **{**brisk, "rest": 10.0})
-            for angle in (165.0, 130.0, 97.0, 97.0, 97.0)
+            for angle in (165.0, 130.0, 104.0, 104.0, 104.0)
         ),
         Go(name="walk on", until=places.target, above=places.lower, **walk),
         Bend(name="lie down", angle=None, steps=STEP, ahead=0.05, brisk=True, rest=0.0),
