@@ -177,7 +177,7 @@ class CourseWalker:
     clinging = 0.05  # the same of rigid ones that still pull [K/s]
     hottest = 172.0  # temperature that no TCA is to exceed [°C]
     stalled = 35.0  # time without headway after which another gait is tried [s]
-    trial = 20.0  # time after which the headway of a gait is judged by its pace [s]
+    trial = 15.0  # time after which the headway of a gait is judged by its pace [s]
 
     def __init__(
         self,
