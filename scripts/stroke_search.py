@@ -102,7 +102,7 @@ def together(gait: Gait) -> Gait:
 def first_gait(stage: str) -> Gait:
     """Where the search begins."""
     if stage == "mount":
-        return replace(PUSH, hot=(course_quick.SHOVE.hot[0],) * 3)
+        return replace(PUSH, hot=(CourseWalker.hottest,) * 3)
     found = SavedPolicy.read(find("tetrapod-shimmy")).gait
     assert found is not None
     return together(found)

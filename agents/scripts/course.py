@@ -384,7 +384,8 @@ class CourseWalker:
             lifting = self._part == "soften" and self._time < 3.0
             legs[2:] = _LIFTED if lifting else _REACHING
             if self._part == "bend" and self._time > 4.0:  # they shake the body level
-                legs = WALK.temperature(self._time / WALK.period).reshape(4, 3)
+                shake = PUSH if stage.brisk else WALK
+                legs = shake.temperature(self._time / shake.period).reshape(4, 3)
         elif stage.braced and self._part != "release" and not self._back:
             legs[:] = _BRACED
         elif (stepping or self._back) and stage.steps is not None:
