@@ -91,7 +91,7 @@ def quick(places: Places, gaits: Mapping[str, Any]) -> tuple[Go | Bend, ...]:
         Go(name="crawl", until=places.stand, **crawl),
         Bend(name="stand up", angle=walking, steps=WALK, ahead=0.03, **brisk),
         # Some stand with their front legs over the edge before; from there, too, they mount.
-        Go(name="walk", until=edge - station + 0.019, patience=15.0, **walk),
+        Go(name="walk", until=edge - station + 0.019, patience=5.0, **walk),
         # A robot that falls back as it comes to lie on the beam needs a minute to make up for it.
         Go(name="mount", gait=gaits["mount"], until=edge + station + 0.004, patience=90.0,
            steers=True),
@@ -103,10 +103,10 @@ def quick(places: Places, gaits: Mapping[str, Any]) -> tuple[Go | Bend, ...]:
         *(
             Bend(name="open", angle=math.radians(angle), steps=STEP, braced=True, enough=wide,
                  **{**brisk, "rest": 10.0})
-            for angle in (165.0, 130.0, 104.0, 104.0, 104.0)
+            for angle in (165.0, 130.0, *(104.0,) * 6)
         ),
         # All of the body is on the target from 15 mm before its middle.
-        Go(name="walk on", until=places.target - 0.010, above=places.lower, **walk),
+        Go(name="walk on", until=places.target - 0.014, above=places.lower, **walk),
         Bend(name="lie down", angle=None, steps=STEP, ahead=0.05, brisk=True, rest=0.0),
     )  # fmt: skip
 
