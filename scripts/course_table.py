@@ -133,8 +133,9 @@ def unmounted(kept: dict[str, Any], who: str = "shapes") -> str:
         for seed, rows in by_seed(kept).items() if who in rows and not rows[who]["ending"]
     }  # fmt: skip
     missed = [f"{seed} ({100 * share:.0f} %)" for seed, share in least.items() if share > AIM]
+    but = f"; not on {', '.join(missed)}" if missed else ""
     return (f"Had it mounted the beam in no time at all, the {CONTROLLERS[who]} would be within"
-            f" that on {len(least) - len(missed)} of {len(least)}; not on {', '.join(missed)}.")
+            f" that on {len(least) - len(missed)} of {len(least)}{but}.")
 
 
 def write_page(kept: dict[str, Any]) -> None:

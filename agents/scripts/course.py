@@ -383,6 +383,8 @@ class CourseWalker:
         if stage.reaching and self._part in ("soften", "bend"):
             lifting = self._part == "soften" and self._time < 3.0
             legs[2:] = _LIFTED if lifting else _REACHING
+            if stage.brisk:  # with its front legs it holds the beam, or may fall to one side
+                legs[:2] = _BRACED
             if self._part == "bend" and self._time > 4.0:  # they shake the body level
                 shake = PUSH if stage.brisk else WALK
                 legs = shake.temperature(self._time / shake.period).reshape(4, 3)
