@@ -11,6 +11,7 @@ legs, which all take from S, are left out.
 """
 
 import argparse
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -86,9 +87,12 @@ def main(argv: list[str] | None = None) -> None:
     """Computes the bounds, draws them and prints their table."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--out", type=Path, default=Path("docs/pictures/walk_limit.png"))
-    out = parser.parse_args(argv).out
+    parser.add_argument("--loss", type=float, default=1.0,
+                        help="factor of the heat lost to the air, as with a fan; draws nothing")
+    args = parser.parse_args(argv)
     leg = LegSpec()
     heat, place = leg.tca.of_length(leg.length).heat, foot_place(leg)
+    heat = replace(heat, loss=args.loss * heat.loss)
     rows = {
         name: np.array([bound(place, heat, period, power) for period in PERIODS])
         for name, power in POWERS.items()
@@ -98,6 +102,8 @@ def main(argv: list[str] | None = None) -> None:
     for i, period in enumerate(PERIODS):
         cells = [f"{1e3 * row[i, 0]:.1f} mm | {1e3 * row[i, 1]:.1f} mm/s" for row in rows.values()]
         print(f"| {period:g} s | {' | '.join(cells)} |")
+    if args.loss != 1.0:
+        return
 
     from matplotlib.figure import Figure
 
@@ -110,8 +116,8 @@ def main(argv: list[str] | None = None) -> None:
     axes.set(xlabel="period of the gait [s]", ylabel="speed at most [mm/s]", ylim=(0.0, None))
     axes.legend(frameon=False, title="power of a TCA")
     axes.spines[["top", "right"]].set_visible(False)
-    out.parent.mkdir(parents=True, exist_ok=True)
-    figure.savefig(out, dpi=150)
+    args.out.parent.mkdir(parents=True, exist_ok=True)
+    figure.savefig(args.out, dpi=150)
 
 
 if __name__ == "__main__":
