@@ -18,9 +18,8 @@ import copy
 import math
 import time
 from collections.abc import Sequence
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
-from functools import partial
+from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -32,6 +31,7 @@ from tca_mj.agents.policies.load import find
 from tca_mj.agents.scripts import course_quick
 from tca_mj.agents.scripts.course import PUSH, CourseWalker, Go
 from tca_mj.agents.train.gait_space import GaitSpace
+from tca_mj.agents.workers import Workers
 from tca_mj.control import Gait
 from tca_mj.registry import make
 
@@ -54,6 +54,7 @@ class Moment(NamedTuple):
     observation: NDArray[np.float32]
 
 
+@cache  # of each process
 def begun(stage: str, seed: int) -> Moment:
     """Where the one policy has led a robot to when the stage begins."""
     arguments = course_quick.shapes.arguments  # type: ignore[attr-defined]
@@ -108,15 +109,9 @@ def first_gait(stage: str) -> Gait:
     return together(found)
 
 
-_MOMENTS: list[Moment] = []  # of a worker
-
-
-def _prepare(stage: str, seeds: Sequence[int]) -> None:
-    _MOMENTS[:] = [begun(stage, seed) for seed in seeds]
-
-
-def _times(stage: str, gait: Gait) -> list[float]:
-    return [lasted(moment, stage, gait) for moment in _MOMENTS]
+def times(stage: str, seeds: Sequence[int], gait: Gait) -> list[float]:
+    """How long it takes each of the robots [s]."""
+    return [lasted(begun(stage, seed), stage, gait) for seed in seeds]
 
 
 def rounded(gait: Gait) -> Gait:
@@ -141,18 +136,19 @@ def main(argv: list[str] | None = None) -> None:
                     population_size=POPULATION)  # fmt: skip
     best, clock = (math.inf, begin, list[float]()), time.monotonic()
     print(f"robots {', '.join(map(str, seeds))}; a generation is {POPULATION} gaits")
-    with ProcessPoolExecutor(args.workers, initializer=_prepare, initargs=(stage, seeds)) as pool:
+    with Workers(args.workers) as workers:
         for generation in range(args.generations):
             points = [optimiser.ask() for _ in range(POPULATION)]
             gaits = [rounded(together(space.decode(space.fold(point))[0]))
                      for point in (np.array(optimiser.mean), *points)]  # fmt: skip
-            times = list(pool.map(partial(_times, stage), gaits))
-            worth = [float(np.mean(np.log(row))) for row in times]
+            found_by = dict(workers.run(times, [(stage, seeds, gait) for gait in gaits]))
+            rows = [found_by[i] for i in range(len(gaits))]
+            worth = [float(np.mean(np.log(row))) for row in rows]
             optimiser.tell(list(zip(points, worth[1:], strict=True)))
             found = int(np.argmin(worth))
             better = worth[found] < best[0]
             if better:
-                best = worth[found], gaits[found], times[found]
+                best = worth[found], gaits[found], rows[found]
             print(f"generation {generation + 1}: middle {math.exp(worth[0]):.1f} s, best so far"
                   f" {math.exp(best[0]):.1f} s ({', '.join(f'{t:.0f}' for t in best[2])}), "
                   f"{time.monotonic() - clock:.0f} s gone", flush=True)  # fmt: skip

@@ -25,6 +25,7 @@ from numpy.typing import ArrayLike
 import tca_mj
 from tca_mj import checks, control, rod, variation
 from tca_mj.agents.model import TaskModel, Transitions, View
+from tca_mj.agents.policies.files import SavedPolicy
 from tca_mj.agents.policies.network import Network
 from tca_mj.agents.train.config import OffPolicy
 from tca_mj.agents.train.distil import Teacher
@@ -307,6 +308,10 @@ BY_SURFACE: dict[str, dict[str, Any]] = {
     "control.morph.ClosedLoop": {
         "pi": lambda: control.PiSpec(proportional=1.0, highest=2.0),
         "angle_of": lambda: math.sqrt,
+    },
+    "agents.policies.network.Network.alike": {
+        "observation": lambda: _same(SavedPolicy.read(shipped_policy("bend-reach")).network.inputs),
+        "action": lambda: _same(SavedPolicy.read(shipped_policy("bend-reach")).network.outputs),
     },
     "agents.policies.network.Network": {
         "weights": lambda: (np.ones((1, 2), np.float32),), "mean": lambda: np.zeros(2),
@@ -633,6 +638,10 @@ def _samples() -> dict[Any, Callable[[], Any]]:
     }  # fmt: skip
 
 
+
+
+def _same(count: int) -> Any:
+    return np.arange(count), np.ones(count, np.float32)  # a mirror in which nothing is another
 
 
 @cache

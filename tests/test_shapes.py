@@ -134,12 +134,20 @@ def test_a_fan_halves_the_cooling_and_is_off_without(course):
 
 def test_the_quick_plan_goes_where_the_plan_goes(course):
     slow, fast = stages(course.places), quick(course.places, SCRIPTED)
-    assert [stage.name for stage in slow] == [stage.name for stage in fast]
-    for one, other in zip(slow, fast, strict=True):
-        if isinstance(one, Bend):
-            assert one.angle == other.angle and other.brisk and not one.brisk
-        else:
-            assert one.until == other.until
+    first = next(i for i, stage in enumerate(slow) if stage.name == "open")
+    rest = [stage.name for stage in slow[first:] if stage.name != "open"]
+    assert [stage.name for stage in fast] == [
+        *(stage.name for stage in slow[:first]), *["open"] * 8, *rest
+    ]  # fmt: skip
+    for one, other in [*zip(slow[:first], fast, strict=False),
+                       *zip(slow[-len(rest) :], fast[-len(rest) :], strict=True)]:  # fmt: skip
+        if isinstance(one, Bend):  # it clamps by what its TCAs can
+            assert other.brisk and not one.brisk
+            assert one.angle == other.angle or (one.name == "clamp" and other.angle > one.angle)
+        else:  # the last spine is just off the beam, all of the body on the target
+            less = {"step off": 2.5e-3, "walk on": 14e-3}.get(one.name, 0.0)
+            assert one.until - other.until == pytest.approx(less, abs=1e-9)
+    assert fast[-2].until > course.places.target - course.places.target_size[0] + 0.075
     assert math.isclose(course.places.beam_top, 45e-3)
     assert math.isclose(course.places.lower, -59e-3)
 
