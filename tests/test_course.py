@@ -331,7 +331,7 @@ def test_the_first_gait_that_keeps_the_pace_is_kept_and_else_the_fastest(
 
 @pytest.mark.parametrize("brisk", [False, True])
 def test_a_soft_body_holds_the_beam_with_curled_front_legs(brisk, shared):
-    """On the quicker plan; with cold ones two robots of 27 fell to one side."""
+    """On the quicker plan; with cold ones two robots of 34 fell to one side."""
     stage = Bend(name="clamp", angle=3.8, reaching=True, brisk=brisk)
     walker = CourseWalker(shared, (stage,))
     legs, _, _ = walker._bend(stage, OBSERVATION.read(shared.seen()))

@@ -41,8 +41,8 @@ SHOVE = Gait(
 )  # fmt: skip
 """How to get onto the beam: all legs together, those of the rear more strongly. Searched by CMA-ES
 (``scripts/stroke_search.py mount``), begun with ``PUSH`` with as hot TCAs, on three robots that are
-off in everything (seeds 300, 308 and 309): on it in 35, 58 and 35 s, where that takes 60, 171 and
-47."""
+off in everything (seeds 300, 308 and 309), physics at 10 ms: on it in 35, 58 and 35 s, where that
+takes 60, 171 and 47."""
 
 CLASP = Gait(
     period=5.82, offset=(0.0, 0.0, 0.434, 0.434),
@@ -54,7 +54,8 @@ CLASP = Gait(
 """The shimmy on this beam, which is wider than that of the shimmy's own task, and of a body that
 clamps by what its TCAs can. Searched by CMA-ES (``scripts/stroke_search.py shimmy``), begun with
 the searched gait of that task, on robots whose TCAs are weak or whose body is heavy (seeds 308, 315
-and 317): off the beam in 56, 52 and 56 s, where that gait takes 63, 60 and 68."""
+and 317), physics at 10 ms: off the beam in 56, 52 and 56 s. Their geometric mean is 55 s, where
+that gait has 64."""
 
 # Turn over the way aside [rad/m], and the largest [rad]: by trial, on seeds 219, 303 and 310.
 _BACK, _MOST = 8.0, 0.12
@@ -81,6 +82,7 @@ def quick(places: Places, gaits: Mapping[str, Any]) -> tuple[Go | Bend, ...]:
     # Weak TCAs need more time for a stroke than the shimmy gives them.
     found = SavedPolicy.read(find("tetrapod-shimmy")).gait
     assert found is not None
+    # Which are tried below 3.5 and 1.5 mm/s: by trial, on seeds 300 to 318.
     strokes = (CLASP, replace(found, period=1.6 * found.period), HURRY[2])
     astride: dict[str, Any] = {
         "gait": (*gaits["shimmy"], *strokes), "above": places.beam_top, "clings": True,
