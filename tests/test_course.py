@@ -1,5 +1,6 @@
 """``TCA/TetrapodCourse-v0`` and its scripted controller."""
 
+import copy
 import hashlib
 import json
 import pickle
@@ -353,6 +354,27 @@ def test_a_body_that_curled_legs_opened_too_far_steps_while_it_is_bent_back(degr
         assert curled != back
         if back:
             np.testing.assert_array_equal(legs, STEP.temperature(0.0).reshape(4, 3))
+
+
+def test_a_copy_of_task_and_walker_goes_on_by_itself_to_the_last_bit():
+    """As scripts/stroke_search.py relies on."""
+    env = TetrapodCourse(action="power")
+    observation, _ = env.reset(seed=0)
+    walker = CourseWalker(env)
+
+    def walk(moment, steps=30):
+        task, who, seen = moment
+        for _ in range(steps):
+            seen = task.step(who.act(seen))[0]
+        return task, who, seen
+
+    moment = walk((env, walker, observation))
+    before = env.data.qpos.copy()
+    copied = walk(copy.deepcopy(moment))
+    np.testing.assert_array_equal(env.data.qpos, before)
+    np.testing.assert_array_equal(walk(moment)[2], copied[2])
+    np.testing.assert_array_equal(env.data.qpos, copied[0].data.qpos)
+    assert not np.array_equal(env.data.qpos, before)
 
 
 def test_a_pace_is_for_all_gaits_or_for_each_but_the_first():
